@@ -1,0 +1,51 @@
+"""The spectral radiance image: what the renderer hands to the optics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fullwell.core.errors import ShapeError
+from fullwell.radiometry.grid import WavelengthGrid
+
+__all__ = ["RadianceImage"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RadianceImage:
+    """Spectral photon radiance seen through the entrance pupil, on a regular grid of ray directions.
+
+    Attributes
+    ----------
+    photons
+        (rows, cols, bands) float32 [photons s^-1 m^-2 sr^-1 nm^-1], band means of `grid`; row 0 is the top.
+    grid
+        The wavelength bands.
+    tangent_pitch
+        Spacing of the samples in the tangent of the field angle: the sample (row, col) looks along
+        x = (col + 0.5 - cols/2) * tangent_pitch (right), y = (row + 0.5 - rows/2) * tangent_pitch (down), z = 1.
+        Each sample is the mean over its square cell.
+    standard_error
+        (rows, cols) float32, relative Monte-Carlo standard error of the band sum, or None where it is not known.
+    """
+
+    photons: NDArray[np.float32]
+    grid: WavelengthGrid
+    tangent_pitch: float
+    standard_error: NDArray[np.float32] | None = None
+
+    def __post_init__(self) -> None:
+        if self.photons.ndim != 3 or self.photons.shape[2] != self.grid.count:
+            raise ShapeError(f"photons has shape {self.photons.shape}; must be (rows, cols, {self.grid.count}).")
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return int(self.photons.shape[0])
+
+    @property
+    def cols(self) -> int:
+        """Number of columns."""
+        return int(self.photons.shape[1])

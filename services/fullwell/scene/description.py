@@ -1,0 +1,287 @@
+"""The scene as the numerics see it: frozen dataclasses, metres, z up, spectra in absolute units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fullwell.radiometry.spectrum import Spectrum
+
+__all__ = [
+    "Conductor",
+    "ConstantEnvironment",
+    "Cube",
+    "Cylinder",
+    "Dielectric",
+    "Diffuse",
+    "DirectionalLight",
+    "Disk",
+    "Emission",
+    "Geometry",
+    "ImageEnvironment",
+    "Light",
+    "Material",
+    "Mesh",
+    "Mirror",
+    "Part",
+    "PointLight",
+    "Principled",
+    "Rectangle",
+    "RoughPlastic",
+    "SceneDescription",
+    "SceneObject",
+    "Sphere",
+    "SpotLight",
+    "SunSky",
+    "Texture",
+]
+
+
+# Geometry, in the part's own coordinates -----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Sphere:
+    """Sphere of `radius_m` about the origin."""
+
+    radius_m: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Rectangle:
+    """Rectangle in the xy plane, centred, `size_m` = (x, y) edge lengths; its normal is +z."""
+
+    size_m: tuple[float, float] = (1.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Disk:
+    """Disk in the xy plane of `radius_m`; its normal is +z."""
+
+    radius_m: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Cube:
+    """Box of edge lengths `size_m` = (x, y, z), centred on the origin."""
+
+    size_m: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Cylinder:
+    """Open cylinder of `radius_m` along z, from -height_m/2 to +height_m/2, normals outwards."""
+
+    radius_m: float = 1.0
+    height_m: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mesh:
+    """Triangles. `normals` and `uv` are per vertex, or None (then shading is flat / untextured)."""
+
+    vertices_m: NDArray[np.float64]
+    faces: NDArray[np.uint32]
+    normals: NDArray[np.float64] | None = None
+    uv: NDArray[np.float64] | None = None
+
+
+Geometry: TypeAlias = Sphere | Rectangle | Disk | Cube | Cylinder | Mesh
+
+
+# Materials -----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Texture:
+    """An sRGB colour image, (rows, cols, 3) uint8, row 0 at v = 1; upsampled to reflectance by the renderer."""
+
+    pixels: NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Diffuse:
+    """Lambertian; reflectance in [0, 1]. Two-sided."""
+
+    reflectance: Spectrum | Texture
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoughPlastic:
+    """Diffuse base under a rough dielectric coat (GGX, `roughness` = alpha in (0, 1])."""
+
+    reflectance: Spectrum | Texture
+    roughness: float = 0.1
+    interior_index: float = 1.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Principled:
+    """The metallic-roughness model of asset formats."""
+
+    base_color: Spectrum | Texture
+    roughness: float = 0.5
+    metallic: float = 0.0
+    specular: float = 0.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Conductor:
+    """Metal with complex index eta + i k; roughness 0 is a perfect mirror surface."""
+
+    eta: Spectrum
+    k: Spectrum
+    roughness: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Dielectric:
+    """Clear refracting body; roughness 0 is polished."""
+
+    interior_index: float = 1.5046
+    exterior_index: float = 1.000277
+    roughness: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mirror:
+    """Ideal specular reflector of the given reflectance."""
+
+    reflectance: Spectrum
+
+
+Material: TypeAlias = Diffuse | RoughPlastic | Principled | Conductor | Dielectric | Mirror
+
+
+# Objects -------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Emission:
+    """Surface emission: radiance [W sr^-1 m^-2 nm^-1] on the side of the normal, in a named light group."""
+
+    radiance: Spectrum
+    group: str = "default"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """One geometry with one material. `to_object` is the (4, 4) affine transform into the object's coordinates."""
+
+    geometry: Geometry
+    material: Material
+    to_object: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
+    emission: Emission | None = None
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SceneObject:
+    """What a label counts as one thing.
+
+    Attributes
+    ----------
+    id
+        Stable string from the recipe, unique in the scene.
+    semantic_class
+        For example "car"; "" means unlabelled (semantic id 0; it still has an instance id).
+    parts
+        At least one.
+    to_world
+        (4, 4) affine transform from object to world [m].
+    licences
+        Licence identifiers of the assets it is made of.
+    """
+
+    id: str
+    semantic_class: str
+    parts: tuple[Part, ...]
+    to_world: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
+    licences: tuple[str, ...] = ()
+
+
+# Lights --------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointLight:
+    """Radiant intensity [W sr^-1 nm^-1], equal in all directions."""
+
+    position_m: tuple[float, float, float]
+    intensity: Spectrum
+    group: str = "default"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SpotLight:
+    """Radiant intensity [W sr^-1 nm^-1] on the axis, full within `beam_deg`, linear in angle to 0 at `cutoff_deg`.
+
+    Both are half angles from the axis, 0 < beam_deg < cutoff_deg < 90.
+    """
+
+    position_m: tuple[float, float, float]
+    direction: tuple[float, float, float]
+    intensity: Spectrum
+    beam_deg: float
+    cutoff_deg: float
+    group: str = "default"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DirectionalLight:
+    """Irradiance [W m^-2 nm^-1] on a surface facing the light; `direction` is the way the light travels."""
+
+    direction: tuple[float, float, float]
+    irradiance: Spectrum
+    group: str = "default"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ConstantEnvironment:
+    """The same radiance [W sr^-1 m^-2 nm^-1] from every direction."""
+
+    radiance: Spectrum
+    group: str = "default"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImageEnvironment:
+    """A latitude-longitude image times a spectrum.
+
+    `pixels` (rows, cols, 3) float32 linear sRGB, row 0 at the zenith (+z), relative; the pixel colour is upsampled, and
+    a pixel of (1, 1, 1) has the radiance `radiance` [W sr^-1 m^-2 nm^-1]. `azimuth_deg` turns it about +z.
+    """
+
+    pixels: NDArray[np.float32]
+    radiance: Spectrum
+    azimuth_deg: float = 0.0
+    group: str = "default"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SunSky:
+    """Sun and clear sky in absolute units. `sun_direction` points from the scene to the sun, above the horizon."""
+
+    sun_direction: tuple[float, float, float]
+    turbidity: float = 3.0
+    ground_albedo: float = 0.2
+    sun_weight: float = 1.0
+    sky_weight: float = 1.0
+    kind: Literal["hosek-wilkie"] = "hosek-wilkie"
+    group: str = "default"
+
+
+Light: TypeAlias = PointLight | SpotLight | DirectionalLight | ConstantEnvironment | ImageEnvironment | SunSky
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SceneDescription:
+    """Everything the renderer needs but the camera."""
+
+    objects: tuple[SceneObject, ...]
+    lights: tuple[Light, ...] = ()
+    semantic_classes: tuple[str, ...] = ()
+    """Names in the order of their semantic ids: ``semantic_classes[i]`` has id i + 1; 0 is unlabelled."""
