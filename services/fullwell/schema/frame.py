@@ -1,0 +1,84 @@
+"""One frame of a recipe, resolved: what the pipeline runs. The last stop before dataclasses only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fullwell.isp.parameters import IspSettings
+from fullwell.radiometry import WavelengthGrid
+from fullwell.scene import Camera, SceneDescription
+from fullwell.sensor.parameters import Exposure, SensorModel
+
+__all__ = ["PRODUCTS", "CameraRig", "FrameDescription", "Quality", "SensorRig"]
+
+PRODUCTS: tuple[str, ...] = (
+    "image.png",
+    "raw.npz",
+    "raw.tiff",
+    "radiance.exr",
+    "irradiance.exr",
+    "depth.exr",
+    "normals.exr",
+    "instances.png",
+    "semantic.png",
+    "labels.json",
+)
+"""Products that `outputs` may ask for; manifest.json is always written, last."""
+
+
+@dataclass(frozen=True, slots=True)
+class Quality:
+    """How much work the renderer does: `samples_per_pixel` (camera rays) and `max_depth` (surface hits of a path)."""
+
+    samples_per_pixel: int = 64
+    max_depth: int = 8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SensorRig:
+    """A sensor behind a lens, its exposure and its image processing."""
+
+    name: str
+    model: SensorModel
+    exposure: Exposure
+    isp: IspSettings
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraRig:
+    """A camera and the sensors that see through its lens."""
+
+    camera: Camera
+    sensors: tuple[SensorRig, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameDescription:
+    """Everything that decides the bytes of one frame.
+
+    Attributes
+    ----------
+    recipe_name, seed, index, count
+        Of the recipe; `index` runs from 0 to `count` - 1.
+    varied
+        (path, value) pairs that `vary` set for this frame.
+    outputs
+        Names from PRODUCTS.
+    warnings
+        Sentences for the manifest: upsampled colours and the like.
+    recipe_json
+        The recipe of this frame as canonical JSON text, with `vary` and overrides applied and removed.
+    """
+
+    recipe_name: str
+    seed: int
+    index: int
+    count: int
+    varied: tuple[tuple[str, str | int | float | bool], ...]
+    scene: SceneDescription
+    cameras: tuple[CameraRig, ...]
+    grid: WavelengthGrid
+    outputs: tuple[str, ...]
+    quality: Quality
+    warnings: tuple[str, ...]
+    recipe_json: str
