@@ -105,9 +105,7 @@ class Camera:
         return inverse
 
 
-def look_at(
-    origin_m: NDArray[np.float64], target_m: NDArray[np.float64], up: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def look_at(origin_m: NDArray[np.float64], target_m: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the (4, 4) camera-to-world transform of a camera at `origin_m` that looks at `target_m`.
 
     `up` is the world direction that appears upwards in the image. Raises FieldError where origin and target coincide or
