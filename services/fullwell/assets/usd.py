@@ -1,0 +1,443 @@
+"""USD stages into triangles: references, payloads, default variants, instances, subsets, preview surfaces."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fullwell.assets.model import ModelSource, PartDraft, SurfaceDraft, UpAxis, linear_to_srgb
+from fullwell.assets.preflight import confined_path
+from fullwell.assets.surfaces import mean_srgb, pixels_of, tinted
+
+__all__ = ["UsdStage", "default_root", "read_usd"]
+
+_CLIMB = 4
+_LAYER_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UsdStage:
+    """What a stage holds, in its own unit and axes."""
+
+    parts: tuple[PartDraft, ...]
+    unit_m: float
+    up_axis: UpAxis
+    warnings: tuple[str, ...]
+
+
+@dataclass(slots=True, eq=False)
+class _Reading:
+    """State of one reading: where from, what was noticed, which materials are known already."""
+
+    source: ModelSource
+    root: Path
+    warnings: list[str] = field(default_factory=list)
+    surfaces: dict[str, SurfaceDraft] = field(default_factory=dict)
+    triangles: int = 0
+
+    def warn(self, sentence: str) -> None:
+        self.warnings.append(f"{self.source.file.name}: {sentence}")
+
+
+def default_root(file: Path) -> Path:
+    """Return the folder that a USD layer's references must stay within where the caller names none.
+
+    Kits of USD layers share folders for materials and textures above the layer's own, so relative references may climb at
+    most four levels, and never to the top of the file system or to a folder right below it.
+    """
+    folder = file.resolve().parent
+    for _ in range(_CLIMB):
+        if len(folder.parent.parts) < 3:
+            break
+        folder = folder.parent
+    return folder
+
+
+def read_usd(source: ModelSource) -> UsdStage:
+    """Return all visible meshes of a stage at its default time, with default variants and all payloads.
+
+    Purposes "default" and "render" are read; "proxy" and "guide" are not. Subdivision surfaces are drawn as their control
+    mesh. Raises ModelError for damaged layers, missing references, and references outside the root.
+    """
+    try:
+        from pxr import Tf, UsdUtils  # noqa: PLC0415  (an extra)
+    except ImportError as missing:
+        raise source.error("needs the package usd-core to be read", "Install fullwell[render]") from missing
+    # USD writes what it finds wrong to the terminal; the delegate collects it instead.
+    delegate = UsdUtils.CoalescingDiagnosticDelegate()
+    reading = _Reading(source, default_root(source.file) if source.root is None else source.root)
+    try:
+        return _read_stage(reading)
+    except Tf.ErrorException as error:
+        raise source.error(f"is damaged ({_first_line(error)})", "Check it with usdchecker, or export it again") from error
+    finally:
+        delegate.TakeUncoalescedDiagnostics()
+        del delegate
+
+
+def _first_line(error: Exception) -> str:
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    return next((line for line in lines if "Error in" not in line), lines[0] if lines else type(error).__name__)[:200]
+
+
+def _read_stage(reading: _Reading) -> UsdStage:
+    from pxr import Sdf, Usd, UsdGeom  # noqa: PLC0415
+
+    file = str(reading.source.file.resolve())
+    layer = Sdf.Layer.FindOrOpen(file)
+    if layer is None:
+        raise reading.source.error("is damaged or not a USD layer", "Check it with usdchecker, or export it again")
+    # A layer may be cached from an earlier reading of a file that has changed since.
+    layer.Reload()
+    _check_references(reading, file)
+    stage = Usd.Stage.Open(layer, Usd.Stage.LoadAll)
+    errors = stage.GetCompositionErrors()
+    if errors:
+        raise reading.source.error(f"cannot be composed ({_first_line(Exception(str(errors[0])))})", "Repair its references")
+    unit_m = float(UsdGeom.GetStageMetersPerUnit(stage))
+    if not stage.HasAuthoredMetadata(UsdGeom.Tokens.metersPerUnit):
+        reading.warn(f"the layer states no metersPerUnit; USD's default of {unit_m:g} m is taken. Set unit_m.")
+    if not (np.isfinite(unit_m) and unit_m > 0):
+        raise reading.source.error(f"states metersPerUnit = {unit_m}; must be > 0", "Set unit_m")
+    parts = tuple(_parts_of(reading, stage))
+    return UsdStage(parts, unit_m, "z" if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else "y", tuple(reading.warnings))
+
+
+def _check_references(reading: _Reading, file: str) -> None:
+    """Every layer and texture, in all variants, must lie within the root; layers must exist."""
+    from pxr import UsdUtils  # noqa: PLC0415
+
+    layers, assets, unresolved = UsdUtils.ComputeAllDependencies(file)
+    source = reading.source
+    base = source.file.resolve().parent
+    for path in [layer.realPath for layer in layers if layer.realPath] + [str(asset) for asset in assets]:
+        outer = path.split("[", 1)[0]  # kit.usdz[texture.png] lies in kit.usdz
+        confined_path(source, _relative(outer, base), base=base, root=reading.root)
+    for path in unresolved:
+        name = str(path)
+        confined_path(source, _relative(name, base), base=base, root=reading.root)
+        if name.lower().endswith(_LAYER_SUFFIXES):
+            raise source.error(f"refers to {_relative(name, base)!r}, which is missing", "Copy it to its place in the kit")
+        reading.warn(f"{_relative(name, base)!r} is missing; the constant colour is used.")
+
+
+def _relative(path: str, base: Path) -> str:
+    """The path as seen from `base`; addresses and what is relative already stay as they are."""
+    if "://" in path or not Path(path).is_absolute():
+        return path
+    real = Path(path).resolve()
+    climbs = 0
+    folder = base
+    while not real.is_relative_to(folder):
+        folder, climbs = folder.parent, climbs + 1
+    return "../" * climbs + real.relative_to(folder).as_posix()
+
+
+# Geometry ------------------------------------------------------------------------------------------------------------
+
+
+def _parts_of(reading: _Reading, stage: Any) -> Iterator[PartDraft]:
+    from pxr import Usd, UsdGeom  # noqa: PLC0415
+
+    transforms = UsdGeom.XformCache(Usd.TimeCode.Default())
+    skipped: set[str] = set()
+    walk = iter(Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
+    for prim in walk:
+        imageable = UsdGeom.Imageable(prim)
+        if imageable:
+            hidden = imageable.ComputeVisibility() == UsdGeom.Tokens.invisible
+            if hidden or imageable.ComputePurpose() in (UsdGeom.Tokens.proxy, UsdGeom.Tokens.guide):
+                walk.PruneChildren()
+                continue
+        if prim.IsA(UsdGeom.PointInstancer):
+            walk.PruneChildren()
+            skipped.add("PointInstancer")
+        elif prim.IsA(UsdGeom.Mesh):
+            matrix = np.array(transforms.GetLocalToWorldTransform(prim), dtype=np.float64)
+            yield from _mesh_parts(reading, UsdGeom.Mesh(prim), matrix)
+        elif prim.IsA(UsdGeom.Gprim):
+            skipped.add(str(prim.GetTypeName()))
+    if skipped:
+        reading.warn(f"prims of type {', '.join(sorted(skipped))} are not read; convert them to meshes.")
+
+
+def _mesh_parts(reading: _Reading, mesh: Any, matrix: NDArray[np.float64]) -> Iterator[PartDraft]:
+    path = str(mesh.GetPath())
+    points = _array(mesh.GetPointsAttr().Get(), np.float64, 3)
+    counts = _array(mesh.GetFaceVertexCountsAttr().Get(), np.int64, 1).reshape(-1)
+    indices = _array(mesh.GetFaceVertexIndicesAttr().Get(), np.int64, 1).reshape(-1)
+    if not len(points) or not len(counts):
+        return
+    if counts.min() < 0 or counts.sum() != len(indices):
+        raise reading.source.error(
+            f"has {len(indices)} indices for {int(counts.sum())} face corners in {path}", "Export the mesh again"
+        )
+    if len(indices) and (indices.min() < 0 or indices.max() >= len(points)):
+        raise reading.source.error(
+            f"uses vertex {int(indices.max())} in {path}, which has {len(points)} points", "Export the mesh again"
+        )
+    corners, face_of = _fan(counts)
+    reading.triangles += len(corners)
+    if reading.triangles > reading.source.max_triangles:
+        raise reading.source.error(
+            f"holds more than {reading.source.max_triangles} triangles", "Simplify the model, or raise max_triangles"
+        )
+    hole = mesh.GetHoleIndicesAttr().Get()
+    if hole is not None and len(hole):
+        keep = ~np.isin(face_of, np.asarray(hole, dtype=np.int64))
+        corners, face_of = corners[keep], face_of[keep]
+    uv = _uv(mesh, counts, indices)
+    normals = _normals(mesh, counts, indices)
+    vertices, normals, flip = _placed(points, normals, matrix)
+    if (mesh.GetOrientationAttr().Get() == "leftHanded") != flip:
+        corners = corners[:, ::-1]
+    for name, prim, faces in _subsets(mesh, len(counts)):
+        chosen = corners[faces[face_of]]
+        if len(chosen):
+            surface = _surface_of(reading, mesh, prim)
+            yield _draft(f"{path}{name}", surface, _Corners(vertices, indices, normals, uv), chosen)
+
+
+def _array(value: Any, dtype: Any, width: int) -> NDArray[Any]:
+    return np.zeros((0, width), dtype) if value is None else np.array(value, dtype=dtype).reshape(-1, width)
+
+
+def _fan(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """(t, 3) corner numbers of a triangle fan per polygon, and (t,) the polygon each belongs to."""
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    triangles = np.maximum(counts - 2, 0)
+    face_of = np.repeat(np.arange(len(counts)), triangles)
+    step = np.arange(len(face_of)) - np.repeat(np.cumsum(triangles) - triangles, triangles)
+    first = starts[face_of]
+    return np.stack([first, first + step + 1, first + step + 2], axis=1), face_of
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Corners:
+    """Values of a mesh: vertices by point, normals and uv by face corner."""
+
+    vertices: NDArray[np.float64]
+    indices: NDArray[np.int64]
+    normals: NDArray[np.float64] | None
+    uv: NDArray[np.float64] | None
+
+
+def _placed(
+    points: NDArray[np.float64], normals: NDArray[np.float64] | None, matrix: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64] | None, bool]:
+    """Points and normals in the stage's world (USD matrices act on row vectors), and whether the transform mirrors."""
+    linear = matrix[:3, :3]
+    mirrored = bool(np.linalg.det(linear) < 0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        vertices = points @ linear + matrix[3, :3]
+    if normals is not None:
+        cofactors = np.array([np.cross(linear[1], linear[2]), np.cross(linear[2], linear[0]), np.cross(linear[0], linear[1])])
+        normals = normals @ cofactors * (-1.0 if mirrored else 1.0)
+    return vertices, normals, mirrored
+
+
+def _by_corner(
+    values: NDArray[np.float64], interpolation: str, counts: NDArray[np.int64], indices: NDArray[np.int64]
+) -> NDArray[np.float64] | None:
+    """Values of a primvar, one per face corner, or None where their number does not fit."""
+    if interpolation == "faceVarying" and len(values) == len(indices):
+        return values
+    if interpolation in ("vertex", "varying") and len(indices) and len(values) > indices.max():
+        return values[indices]
+    if interpolation == "uniform" and len(values) == len(counts):
+        return np.repeat(values, counts, axis=0)
+    if interpolation == "constant" and len(values) == 1:
+        return np.repeat(values, len(indices), axis=0)
+    return None
+
+
+def _uv(mesh: Any, counts: NDArray[np.int64], indices: NDArray[np.int64]) -> NDArray[np.float64] | None:
+    """Texture coordinates: the primvar st, or else the first one of a two-component type."""
+    from pxr import UsdGeom  # noqa: PLC0415
+
+    primvars = {pv.GetPrimvarName(): pv for pv in UsdGeom.PrimvarsAPI(mesh).FindPrimvarsWithInheritance() if pv.HasValue()}
+    flat = [name for name, pv in primvars.items() if str(pv.GetTypeName()) in ("texCoord2f[]", "float2[]", "texCoord2d[]")]
+    for name in sorted(flat, key=lambda candidate: (candidate not in ("st", "st0", "UVMap", "uv"), candidate)):
+        values = primvars[name].ComputeFlattened()
+        if values is not None:
+            return _by_corner(_array(values, np.float64, 2), str(primvars[name].GetInterpolation()), counts, indices)
+    return None
+
+
+def _normals(mesh: Any, counts: NDArray[np.int64], indices: NDArray[np.int64]) -> NDArray[np.float64] | None:
+    from pxr import UsdGeom  # noqa: PLC0415
+
+    primvar = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("normals")
+    if primvar and primvar.HasValue():
+        return _by_corner(_array(primvar.ComputeFlattened(), np.float64, 3), str(primvar.GetInterpolation()), counts, indices)
+    stated = mesh.GetNormalsAttr().Get()
+    if stated is None:
+        return None
+    return _by_corner(_array(stated, np.float64, 3), str(mesh.GetNormalsInterpolation()), counts, indices)
+
+
+def _subsets(mesh: Any, face_count: int) -> Iterator[tuple[str, Any, NDArray[np.bool_]]]:
+    """(name, prim that the material is bound to, faces) of every material subset, then the faces in none of them."""
+    from pxr import UsdGeom, UsdShade  # noqa: PLC0415
+
+    rest = np.ones(face_count, dtype=bool)
+    # Files in the wild leave the family name of their material subsets away, so every face subset with a binding counts.
+    for subset in UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Imageable(mesh.GetPrim())):
+        if subset.GetElementTypeAttr().Get() != UsdGeom.Tokens.face:
+            continue
+        if not UsdShade.MaterialBindingAPI(subset.GetPrim()).GetDirectBinding().GetMaterialPath():
+            continue
+        chosen = _array(subset.GetIndicesAttr().Get(), np.int64, 1).reshape(-1)
+        faces = np.zeros(face_count, dtype=bool)
+        faces[chosen[(chosen >= 0) & (chosen < face_count)]] = True
+        yield f"/{subset.GetPrim().GetName()}", subset.GetPrim(), faces & rest
+        rest &= ~faces
+    yield "", mesh.GetPrim(), rest
+
+
+def _draft(name: str, surface: SurfaceDraft, corners: _Corners, chosen: NDArray[np.int64]) -> PartDraft:
+    """One part; corners that agree in point, normal and texture coordinate become one vertex."""
+    point = corners.indices[chosen]
+    if corners.normals is None and corners.uv is None:
+        return PartDraft(name, corners.vertices, point, None, None, surface)
+    columns = [corners.indices[:, None].astype(np.float64)]
+    columns += [extra for extra in (corners.normals, corners.uv) if extra is not None]
+    used, local = np.unique(chosen, return_inverse=True)
+    _, first, inverse = np.unique(np.hstack(columns)[used], axis=0, return_index=True, return_inverse=True)
+    keep = used[first]
+    return PartDraft(
+        name,
+        corners.vertices[corners.indices[keep]],
+        inverse.reshape(-1)[local.reshape(-1)].reshape(chosen.shape).astype(np.int64),
+        None if corners.normals is None else corners.normals[keep],
+        None if corners.uv is None else corners.uv[keep],
+        surface,
+    )
+
+
+# Materials -----------------------------------------------------------------------------------------------------------
+
+
+def _surface_of(reading: _Reading, mesh: Any, prim: Any) -> SurfaceDraft:
+    """UsdPreviewSurface of the bound material; without one, displayColor."""
+    from pxr import UsdShade  # noqa: PLC0415
+
+    double_sided = bool(mesh.GetDoubleSidedAttr().Get())
+    material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
+    if not material:
+        surface = SurfaceDraft(double_sided=double_sided)
+        colours = _array(mesh.GetDisplayColorPrimvar().ComputeFlattened(), np.float64, 3)
+        if len(colours) and np.all(np.isfinite(colours)):
+            surface.base_color_srgb = _encoded(colours.mean(axis=0))
+        return surface
+    key = str(material.GetPath())
+    if key not in reading.surfaces:
+        reading.surfaces[key] = _preview_surface(reading, material)
+    known = reading.surfaces[key]
+    return SurfaceDraft(
+        known.base_color_srgb, known.base_color_texture, known.roughness, known.metallic, known.emissive_srgb, double_sided
+    )
+
+
+def _preview_surface(reading: _Reading, material: Any) -> SurfaceDraft:
+    """UsdPreviewSurface 2.6: linear constants, roughness 0.5, metallic 0, diffuse colour 0.18 by default."""
+    surface = SurfaceDraft(base_color_srgb=_encoded(np.full(3, 0.18)), roughness=0.5, metallic=0.0)
+    shader = material.ComputeSurfaceSource()[0]
+    if not shader or shader.GetIdAttr().Get() != "UsdPreviewSurface":
+        reading.warn(f"material {material.GetPath().name!r} is no UsdPreviewSurface; a plain grey is used.")
+        return surface
+    surface.roughness = _number(reading, shader, "roughness", 0.5)
+    surface.metallic = _number(reading, shader, "metallic", 0.0)
+    if _number(reading, shader, "opacity", 1.0) < 1.0:
+        reading.warn(f"material {material.GetPath().name!r} is transparent; it is drawn opaque.")
+    pixels, colour = _colour(reading, shader, "diffuseColor")
+    if pixels is not None:
+        if np.all(pixels == pixels[:1, :1]):
+            # A swatch: one colour in every pixel needs no coordinates.
+            surface.base_color_srgb = mean_srgb(pixels)
+        else:
+            surface.base_color_texture, surface.base_color_srgb = pixels, mean_srgb(pixels)
+    elif colour is not None:
+        surface.base_color_srgb = _encoded(colour)
+    emission_pixels, emission = _colour(reading, shader, "emissiveColor")
+    if emission_pixels is not None:
+        surface.emissive_srgb = mean_srgb(emission_pixels)
+    elif emission is not None and emission.any():
+        surface.emissive_srgb = _encoded(emission)
+    return surface
+
+
+def _input(shader: Any, name: str) -> Any:
+    """The attribute that an input's value comes from: its own, or what it is connected to (through interfaces)."""
+    stated = shader.GetInput(name)
+    sources = stated.GetValueProducingAttributes() if stated else []
+    return sources[0] if sources else None
+
+
+def _number(reading: _Reading, shader: Any, name: str, otherwise: float) -> float:
+    attribute = _input(shader, name)
+    value = None if attribute is None else attribute.Get()
+    if isinstance(value, int | float):
+        return float(value)
+    if attribute is not None and value is None:
+        pixels = _texture(reading, attribute)
+        if pixels is not None:
+            channel = {"r": 0, "g": 1, "b": 2}.get(attribute.GetName().rsplit(":", 1)[-1], 0)
+            reading.warn(f"the mean of the texture of {name} is used.")
+            return float(pixels[..., channel].mean() / 255.0)
+    return otherwise
+
+
+def _colour(reading: _Reading, shader: Any, name: str) -> tuple[NDArray[np.uint8] | None, NDArray[np.float64] | None]:
+    attribute = _input(shader, name)
+    if attribute is None:
+        return None, None
+    value = attribute.Get()
+    if value is not None:
+        colour = np.asarray(value, dtype=np.float64).reshape(-1)
+        return None, colour if colour.shape == (3,) and np.all(np.isfinite(colour)) else None
+    pixels = _texture(reading, attribute)
+    if pixels is not None:
+        return pixels, None
+    from pxr import UsdShade  # noqa: PLC0415
+
+    fallback = UsdShade.Shader(attribute.GetPrim()).GetInput("fallback")
+    constant = fallback.Get() if fallback else None
+    return None, None if constant is None else np.asarray(constant, dtype=np.float64)[:3]
+
+
+def _texture(reading: _Reading, output: Any) -> NDArray[np.uint8] | None:
+    """Pixels of the UsdUVTexture that an output belongs to, with its scale; None where it cannot be read."""
+    from PIL import Image  # noqa: PLC0415
+    from pxr import Ar, UsdShade  # noqa: PLC0415
+
+    shader = UsdShade.Shader(output.GetPrim())
+    if shader.GetIdAttr().Get() != "UsdUVTexture":
+        reading.warn(f"shader {output.GetPrim().GetName()!r} is not read; a constant is used.")
+        return None
+    attribute = _input(shader, "file")
+    asset = None if attribute is None else attribute.Get()
+    if asset is None or not asset.resolvedPath:
+        return None
+    opened = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(asset.resolvedPath))
+    if opened is None:
+        return None
+    try:
+        image = Image.open(io.BytesIO(bytes(opened.GetBuffer())))
+    except (OSError, ValueError, Image.DecompressionBombError) as error:
+        name = Path(str(asset.path)).name
+        raise reading.source.error(f"has a damaged texture {name!r} ({error})", "Export the texture again") from error
+    scale = _input(shader, "scale")
+    factor = np.ones(3) if scale is None or scale.Get() is None else np.asarray(scale.Get(), dtype=np.float64)[:3]
+    return tinted(pixels_of(reading.source, image), factor)
+
+
+def _encoded(linear: NDArray[np.float64]) -> tuple[float, float, float]:
+    red, green, blue = linear_to_srgb(np.asarray(linear, dtype=np.float64)).tolist()
+    return red, green, blue
