@@ -13,6 +13,8 @@ __all__ = ["DEFAULT_GRID", "MAX_WAVELENGTH_NM", "MIN_WAVELENGTH_NM", "Wavelength
 
 MIN_WAVELENGTH_NM = 380.0
 MAX_WAVELENGTH_NM = 1000.0
+MIN_STEP_NM = 0.1
+"""Keeps a mistyped step from asking for millions of bands."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,8 +30,12 @@ class WavelengthGrid:
     step_nm: float = 10.0
 
     def __post_init__(self) -> None:
-        if not self.step_nm > 0:
-            raise FieldError(f"step_nm is {self.step_nm}; must be > 0.", path="step_nm", value=self.step_nm)
+        if not MIN_STEP_NM <= self.step_nm <= MAX_WAVELENGTH_NM - MIN_WAVELENGTH_NM:
+            raise FieldError(
+                f"step_nm is {self.step_nm}; must be within {MIN_STEP_NM:g} to {MAX_WAVELENGTH_NM - MIN_WAVELENGTH_NM:g} nm.",
+                path="step_nm",
+                value=self.step_nm,
+            )
         low, high = MIN_WAVELENGTH_NM, MAX_WAVELENGTH_NM
         for name in ("first_nm", "last_nm"):
             value = getattr(self, name)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fullwell.core.errors import ShapeError
+from fullwell.core.errors import FieldError, ShapeError
 from fullwell.radiometry.grid import WavelengthGrid
 
 __all__ = ["RadianceImage"]
@@ -39,6 +40,16 @@ class RadianceImage:
     def __post_init__(self) -> None:
         if self.photons.ndim != 3 or self.photons.shape[2] != self.grid.count:
             raise ShapeError(f"photons has shape {self.photons.shape}; must be (rows, cols, {self.grid.count}).")
+        if not 0 < self.tangent_pitch < math.inf:
+            raise FieldError(
+                f"tangent_pitch is {self.tangent_pitch}; must be finite and > 0.",
+                path="tangent_pitch",
+                value=self.tangent_pitch,
+            )
+        if self.standard_error is not None and self.standard_error.shape != self.photons.shape[:2]:
+            raise ShapeError(
+                f"standard_error has shape {self.standard_error.shape}; must be (rows, cols) = {self.photons.shape[:2]}."
+            )
 
     @property
     def rows(self) -> int:
