@@ -29,6 +29,7 @@ from fullwell.scene.description import (
     SunSky,
     Texture,
 )
+from fullwell.scene.hits import SurfaceHits
 
 __all__ = [
     "Camera",
@@ -59,6 +60,7 @@ __all__ = [
     "Sphere",
     "SpotLight",
     "SunSky",
+    "SurfaceHits",
     "Texture",
     "look_at",
 ]

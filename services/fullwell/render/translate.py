@@ -1,0 +1,317 @@
+"""A SceneDescription becomes a Mitsuba scene, re-centred on the camera, with each shape traceable to its object."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fullwell.core.errors import FieldError, FullwellError, RenderError
+from fullwell.radiometry.spectrum import Spectrum
+from fullwell.scene import (
+    Conductor,
+    ConstantEnvironment,
+    Cylinder,
+    Dielectric,
+    Diffuse,
+    DirectionalLight,
+    Disk,
+    ImageEnvironment,
+    Light,
+    Material,
+    Mesh,
+    Mirror,
+    Part,
+    PointLight,
+    Principled,
+    RoughPlastic,
+    SceneDescription,
+    Sphere,
+    SpotLight,
+    SunSky,
+    Texture,
+)
+from fullwell.scene.tessellate import is_similarity, mesh_of, transform_mesh
+
+__all__ = ["TranslatedScene", "translate"]
+
+_TABLE_LOW_NM = 300.0
+_TABLE_HIGH_NM = 1100.0
+"""Tables that hold their end values are written out over this range, which contains every wavelength a grid may ask for;
+the renderer's own spectra are 0 outside their tables."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TranslatedScene:
+    """A loaded Mitsuba scene.
+
+    `object_of_shape` maps the renderer's shape ids to indices into ``SceneDescription.objects``; `centre_m` is the world
+    point at the renderer's origin (coordinates of 10^6 m would otherwise lose float32 precision).
+    """
+
+    scene: Any
+    object_of_shape: dict[str, int]
+    centre_m: NDArray[np.float64]
+
+
+def translate(mi: Any, scene: SceneDescription, centre_m: NDArray[np.float64]) -> TranslatedScene:
+    """Load `scene` into the active Mitsuba variant with its origin moved to `centre_m` [m].
+
+    Raises RenderError with the renderer's own words where it refuses the scene.
+    """
+    recentre = np.eye(4)
+    recentre[:3, 3] = -np.asarray(centre_m, dtype=np.float64)
+    contents: dict[str, Any] = {"type": "scene"}
+    object_of_shape: dict[str, int] = {}
+    try:
+        materials = _Materials(mi)
+        for index, scene_object in enumerate(scene.objects):
+            for number, part in enumerate(scene_object.parts):
+                shape_id = f"o{index}_{number}"
+                to_world = recentre @ scene_object.to_world @ part.to_object
+                contents[shape_id] = _shape(mi, materials, shape_id, part, to_world)
+                object_of_shape[shape_id] = index
+        for number, light in enumerate(scene.lights):
+            contents[f"l{number}"] = _emitter(mi, light, recentre)
+        loaded = mi.load_dict(contents, optimize=False)
+    except FullwellError:
+        raise
+    except Exception as error:
+        cause = error.__cause__ or error
+        raise RenderError(f"the renderer refused the scene: {cause}") from error
+    return TranslatedScene(loaded, object_of_shape, np.asarray(centre_m, dtype=np.float64))
+
+
+# Spectra -------------------------------------------------------------------------------------------------------------
+
+
+def _spectrum(spectrum: Spectrum) -> dict[str, Any]:
+    """Write a table out as the renderer's `regular` (equal steps) or `irregular` spectrum, nothing resampled."""
+    wavelength_nm, values = spectrum.wavelength_nm, spectrum.values
+    if not np.any(values):  # the renderer's tables refuse a legal black
+        return {"type": "uniform", "value": 0.0}
+    if spectrum.outside == "hold":
+        low, high = _TABLE_LOW_NM, _TABLE_HIGH_NM
+        if wavelength_nm[0] > low:
+            wavelength_nm, values = np.append(low, wavelength_nm), np.append(values[0], values)
+        if wavelength_nm[-1] < high:
+            wavelength_nm, values = np.append(wavelength_nm, high), np.append(values, values[-1])
+    if wavelength_nm.size == 1:  # a line of no width has no energy, but the renderer wants two points
+        wavelength_nm, values = np.append(wavelength_nm, wavelength_nm[0] + 1.0), np.zeros(2)
+    return {
+        "type": "irregular",
+        "wavelengths": ", ".join(repr(float(w)) for w in wavelength_nm),
+        "values": ", ".join(repr(float(v)) for v in values),
+    }
+
+
+def _colour(mi: Any, colour: Spectrum | Texture) -> dict[str, Any]:
+    if isinstance(colour, Texture):
+        pixels = np.ascontiguousarray(colour.pixels)
+        return {"type": "bitmap", "bitmap": mi.Bitmap(pixels), "raw": False}
+    return _spectrum(colour)
+
+
+# Materials -----------------------------------------------------------------------------------------------------------
+
+
+class _Materials:
+    """Makes each material object once: parts that share a material share the renderer's BSDF."""
+
+    def __init__(self, mi: Any) -> None:
+        self._mi = mi
+        self._made: dict[int, tuple[Material, Any]] = {}
+
+    def get(self, material: Material) -> Any:
+        known = self._made.get(id(material))
+        if known is None:
+            known = (material, self._mi.load_dict(_bsdf(self._mi, material)))
+            self._made[id(material)] = known
+        return known[1]
+
+
+def _two_sided(bsdf: dict[str, Any]) -> dict[str, Any]:
+    return {"type": "twosided", "inner": bsdf}
+
+
+def _bsdf(mi: Any, material: Material) -> dict[str, Any]:
+    match material:
+        case Diffuse(reflectance=reflectance):
+            return _two_sided({"type": "diffuse", "reflectance": _colour(mi, reflectance)})
+        case RoughPlastic():
+            return _two_sided(
+                {
+                    "type": "roughplastic",
+                    "diffuse_reflectance": _colour(mi, material.reflectance),
+                    "alpha": float(material.roughness),
+                    "int_ior": float(material.interior_index),
+                    "distribution": "ggx",
+                    "nonlinear": True,
+                }
+            )
+        case Principled():
+            return _two_sided(
+                {
+                    "type": "principled",
+                    "base_color": _colour(mi, material.base_color),
+                    "roughness": float(material.roughness),
+                    "metallic": float(material.metallic),
+                    "specular": float(material.specular),
+                }
+            )
+        case Conductor():
+            bsdf = {"type": "conductor", "eta": _spectrum(material.eta), "k": _spectrum(material.k)}
+            if material.roughness > 0:
+                bsdf |= {"type": "roughconductor", "alpha": float(material.roughness), "distribution": "ggx"}
+            return _two_sided(bsdf)
+        case Mirror():
+            return _two_sided(
+                {"type": "conductor", "material": "none", "specular_reflectance": _spectrum(material.reflectance)}
+            )
+        case Dielectric():
+            bsdf = {"type": "dielectric", "int_ior": material.interior_index, "ext_ior": material.exterior_index}
+            if material.roughness > 0:
+                bsdf |= {"type": "roughdielectric", "alpha": float(material.roughness), "distribution": "ggx"}
+            return bsdf
+
+
+# Shapes --------------------------------------------------------------------------------------------------------------
+
+
+def _shape(mi: Any, materials: _Materials, shape_id: str, part: Part, to_world: NDArray[np.float64]) -> Any:
+    bsdf = materials.get(part.material)
+    emission = None
+    if part.emission is not None and np.any(part.emission.radiance.values):
+        emission = {"type": "area", "radiance": _spectrum(part.emission.radiance)}
+    native = _native_shape(mi, part, to_world)
+    if native is None:
+        mesh = transform_mesh(to_world, mesh_of(part.geometry))
+        return _mesh_shape(mi, shape_id, mesh, bsdf, emission)
+    native["bsdf"] = bsdf
+    if emission is not None:
+        native["emitter"] = emission
+    return native
+
+
+def _native_shape(mi: Any, part: Part, to_world: NDArray[np.float64]) -> dict[str, Any] | None:
+    """Return the curved primitives as the renderer's exact ones; None where triangles must do (planes, odd scales)."""
+    if not is_similarity(to_world):
+        return None
+    match part.geometry:
+        case Sphere(radius_m=radius):
+            placed = to_world @ np.diag([radius, radius, radius, 1.0])
+            return {"type": "sphere", "to_world": _transform(mi, placed)}
+        case Disk(radius_m=radius):
+            placed = to_world @ np.diag([radius, radius, radius, 1.0])
+            return {"type": "disk", "to_world": _transform(mi, placed)}
+        case Cylinder(radius_m=radius, height_m=height):
+            return {
+                "type": "cylinder",
+                "p0": [0.0, 0.0, -height / 2],
+                "p1": [0.0, 0.0, height / 2],
+                "radius": float(radius),
+                "to_world": _transform(mi, to_world),
+            }
+        case _:
+            return None
+
+
+def _transform(mi: Any, matrix: NDArray[np.float64]) -> Any:
+    return mi.ScalarTransform4f(matrix)
+
+
+def _mesh_shape(mi: Any, shape_id: str, mesh: Mesh, bsdf: Any, emission: dict[str, Any] | None) -> Any:
+    properties = mi.Properties()
+    properties["bsdf"] = bsdf
+    if emission is not None:
+        properties["emitter"] = mi.load_dict(emission)
+    shape = mi.Mesh(shape_id, len(mesh.vertices_m), len(mesh.faces), properties, mesh.normals is not None, mesh.uv is not None)
+    parameters = mi.traverse(shape)
+    parameters["vertex_positions"] = np.ascontiguousarray(mesh.vertices_m, dtype=np.float32).ravel()
+    parameters["faces"] = np.ascontiguousarray(mesh.faces, dtype=np.uint32).ravel()
+    if mesh.normals is not None:
+        parameters["vertex_normals"] = np.ascontiguousarray(mesh.normals, dtype=np.float32).ravel()
+    if mesh.uv is not None:
+        parameters["vertex_texcoords"] = np.ascontiguousarray(mesh.uv, dtype=np.float32).ravel()
+    parameters.update()
+    return shape
+
+
+# Lights --------------------------------------------------------------------------------------------------------------
+
+
+def _emitter(mi: Any, light: Light, recentre: NDArray[np.float64]) -> dict[str, Any]:
+    match light:
+        case PointLight():
+            position = (recentre @ np.append(light.position_m, 1.0))[:3]
+            return {"type": "point", "position": position.tolist(), "intensity": _spectrum(light.intensity)}
+        case SpotLight():
+            position = (recentre @ np.append(light.position_m, 1.0))[:3]
+            return {
+                "type": "spot",
+                "to_world": _transform(mi, _frame_along(position, np.asarray(light.direction))),
+                "intensity": _spectrum(light.intensity),
+                "cutoff_angle": float(light.cutoff_deg),
+                "beam_width": float(light.beam_deg),
+            }
+        case DirectionalLight():
+            return {
+                "type": "directional",
+                "direction": [float(x) for x in light.direction],
+                "irradiance": _spectrum(light.irradiance),
+            }
+        case ConstantEnvironment():
+            return {"type": "constant", "radiance": _spectrum(light.radiance)}
+        case ImageEnvironment():
+            return _image_environment(mi, light)
+        case SunSky():
+            return {
+                "type": "sunsky",
+                "sun_direction": [float(x) for x in light.sun_direction],
+                "turbidity": float(light.turbidity),
+                "albedo": float(light.ground_albedo),
+                "sun_scale": float(light.sun_weight),
+                "sky_scale": float(light.sky_weight),
+            }
+
+
+def _frame_along(position_m: NDArray[np.float64], direction: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the rigid transform that takes +z at the origin to `direction` at `position_m`."""
+    axis = direction / np.linalg.norm(direction)
+    helper = np.array([1.0, 0, 0]) if abs(axis[0]) < 0.9 else np.array([0, 1.0, 0])
+    side = np.cross(helper, axis)
+    side /= np.linalg.norm(side)
+    frame = np.eye(4)
+    frame[:3, 0], frame[:3, 1], frame[:3, 2], frame[:3, 3] = side, np.cross(axis, side), axis, position_m
+    return frame
+
+
+_D65_TABLE_MEAN = 98.99741751876255
+"""The renderer divides its D65 table (100 at 560 nm) by this."""
+
+_D65_TOLERANCE = 0.01
+"""Relative departure from D65's shape that an image environment's spectrum may have."""
+
+
+def _image_environment(mi: Any, light: ImageEnvironment) -> dict[str, Any]:
+    """Return the renderer's environment map: pixel colours are upsampled as reflectances under D65."""
+    from fullwell.radiometry.illuminants import illuminant  # noqa: PLC0415
+
+    probe_nm = np.linspace(400.0, 700.0, 31)
+    wanted, d65 = light.radiance.at(probe_nm), illuminant("D65").at(probe_nm)
+    scale = float(light.radiance.at(560.0)) / 100.0
+    if np.max(np.abs(wanted - scale * d65)) > _D65_TOLERANCE * scale * 100.0:
+        raise FieldError(
+            "the spectrum of an image environment differs from D65; the renderer colours environment images under D65 only. "
+            "Give its luminance and leave the spectrum out.",
+            path="scene.lights",
+        )
+    upright = mi.ScalarTransform4f().rotate([0, 0, 1], 90.0 + float(light.azimuth_deg)).rotate([1, 0, 0], 90.0)
+    return {
+        "type": "envmap",
+        "bitmap": mi.Bitmap(np.ascontiguousarray(light.pixels, dtype=np.float32)),
+        "scale": scale * _D65_TABLE_MEAN,
+        "to_world": upright,
+    }
