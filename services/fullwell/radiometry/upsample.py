@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fullwell.core.errors import FieldError
+from fullwell.radiometry.illuminants import illuminant
+from fullwell.radiometry.photometry import tristimulus
 from fullwell.radiometry.spectrum import Spectrum
 from fullwell.radiometry.tables import table_spectrum
 
@@ -39,7 +42,7 @@ def reflectance_from_srgb(rgb: Sequence[float], path: str = "") -> Spectrum:
 def reflectance_from_linear_srgb(rgb: Sequence[float], path: str = "") -> Spectrum:
     """Return a reflectance in [0, 1] with the linear sRGB colour `rgb` under D65, 380-780 nm, ends held.
 
-    The curve is made up (`upsampled` is True): the colour under D65 returns to 1e-3, other lights may see any metamer.
+    The curve is made up (`upsampled` is True): the colour under D65 returns to 1e-5, other lights may see any metamer.
     Raises FieldError where `rgb` is not three finite values from 0 to 1.
 
     References
@@ -64,7 +67,32 @@ def _checked(rgb: Sequence[float], path: str) -> NDArray[np.float64]:
 
 
 def _mixed(linear: NDArray[np.float64]) -> Spectrum:
-    basis = [table_spectrum("mallett2019", name, "hold", "1") for name in ("red", "green", "blue")]
-    values = sum((weight * curve.values for weight, curve in zip(linear, basis, strict=True)), np.zeros(basis[0].values.size))
-    # The published basis adds up to 1 only to its last digit.
+    basis = _basis()
+    values = np.stack([curve.values for curve in basis], axis=1) @ (_weights_of_colours() @ linear)
+    # The published basis adds up to 1 only to its fifth digit.
     return Spectrum(basis[0].wavelength_nm, np.clip(values, 0.0, 1.0), outside="hold", source=_SOURCE, upsampled=True)
+
+
+def _basis() -> tuple[Spectrum, Spectrum, Spectrum]:
+    red, green, blue = (table_spectrum("mallett2019", name, "hold", "1") for name in ("red", "green", "blue"))
+    return red, green, blue
+
+
+@cache
+def _weights_of_colours() -> NDArray[np.float64]:
+    """Return the (3, 3) matrix from linear sRGB to weights of the basis: the identity to 1e-3.
+
+    The basis was made with sums over 5 nm; our colours are exact integrals, which differ by 1e-3 from such sums. Undoing
+    that keeps the round trip at rounding instead of at 1e-3.
+    """
+    light = illuminant("D65")
+    white = tristimulus(light)
+    colours = np.stack([tristimulus(light.times(curve)) / white[1] for curve in _basis()], axis=1)
+    return np.asarray(np.linalg.solve(colours, _xyz_of_linear_srgb(white / white[1])))
+
+
+def _xyz_of_linear_srgb(white: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the (3, 3) matrix from linear sRGB to XYZ for its primaries (ITU-R BT.709) and a white of Y = 1."""
+    x, y = np.array([[0.64, 0.30, 0.15], [0.33, 0.60, 0.06]])
+    primaries = np.stack([x / y, np.ones(3), (1.0 - x - y) / y])
+    return np.asarray(primaries * np.linalg.solve(primaries, white))
