@@ -1,0 +1,154 @@
+"""Cameras: pose, lens, sensors, exposure, image processing."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from fullwell.schema.v1.common import (
+    Direction,
+    Document,
+    Flag,
+    Fraction,
+    MatrixRows,
+    Name,
+    NonNegative,
+    Point,
+    Positive,
+    PositiveOrInf,
+    Range,
+    Text,
+    exactly_one,
+    refuse,
+)
+from fullwell.schema.v1.spectra import Reflectance, Spd
+
+__all__ = [
+    "AutoExposureDocument",
+    "CameraDocument",
+    "ExposureDocument",
+    "IspDocument",
+    "LensDocument",
+    "PoseDocument",
+    "SensorDocument",
+]
+
+MAX_SIDE_PX = 20_000
+_Side = Annotated[int, Range(ge=1, le=MAX_SIDE_PX, whole=True)]
+
+
+class PoseDocument(Document):
+    """Where the camera is: `origin_m`, `target_m` and `up`, or `matrix`.
+
+    `matrix` is the 4 x 4 rigid camera-to-world transform, camera axes x right, y down, z forward.
+    """
+
+    origin_m: Point | None = None
+    target_m: Point | None = None
+    up: Direction | None = None
+    matrix: MatrixRows | None = None
+
+    @model_validator(mode="after")
+    def _one_way(self) -> PoseDocument:
+        points = [self.origin_m, self.target_m]
+        ways = "give origin_m and target_m (and up), or matrix."
+        if self.matrix is not None and (points != [None, None] or self.up is not None):
+            refuse(f"gives the pose twice; {ways}")
+        if self.matrix is None and None in points:
+            refuse(f"is incomplete; {ways}")
+        return self
+
+
+class LensDocument(Document):
+    """A pinhole or a thin lens. The field of view `hfov_deg` is that of the first sensor's width."""
+
+    kind: Literal["pinhole", "thin_lens"] = "pinhole"
+    focal_length_m: Annotated[float, Range(gt=0, le=100)] | None = None
+    hfov_deg: Annotated[float, Range(gt=0, lt=170)] | None = None
+    f_number: Annotated[float, Range(gt=0, le=1000)]
+    focus_distance_m: PositiveOrInf | None = None
+    transmittance: Reflectance = 1.0
+    diffraction: Flag = True
+
+    @model_validator(mode="after")
+    def _one_length(self) -> LensDocument:
+        exactly_one(self, "focal_length_m", "hfov_deg")
+        focal, focus = self.focal_length_m, self.focus_distance_m
+        if focal is not None and focus is not None and not focus > focal:
+            refuse(f"is {focus:g}; must be > the focal length, {focal:g} m.", "focus_distance_m", value=focus)
+        return self
+
+
+class AutoExposureDocument(Document):
+    """Exposure time found from the noise-free image; `level` is a fraction of the full well."""
+
+    method: Literal["full", "mean", "percentile"] = "percentile"
+    level: Annotated[float, Range(gt=0, le=10)] = 0.7
+    percentile: Annotated[float, Range(gt=0, le=100)] = 99.0
+    min_time_s: Positive = 1e-6
+    max_time_s: Positive = 1.0
+
+    @model_validator(mode="after")
+    def _ordered(self) -> AutoExposureDocument:
+        if self.min_time_s > self.max_time_s:
+            refuse(f"is {self.min_time_s:g}; must be <= max_time_s, {self.max_time_s:g}.", "min_time_s", value=self.min_time_s)
+        return self
+
+
+class ExposureDocument(Document):
+    """A fixed `time_s`, or `auto`."""
+
+    time_s: Annotated[float, Range(gt=0, le=86400)] | None = None
+    auto: AutoExposureDocument | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> ExposureDocument:
+        exactly_one(self, "time_s", "auto")
+        return self
+
+
+class IspDocument(Document):
+    """From raw numbers to a picture; `illuminant` is the light that becomes white."""
+
+    illuminant: Spd = "d65"
+    white_balance: Literal["illuminant", "gray_world", "none"] = "illuminant"
+    demosaic: Literal["bilinear"] = "bilinear"
+
+
+class SensorDocument(Document):
+    """A sensor of the catalogue; any of its numbers may be given instead of the catalogue's."""
+
+    name: Name = "main"
+    model: Text
+    exposure: ExposureDocument
+    isp: IspDocument = Field(default_factory=IspDocument)
+    rows: _Side | None = None
+    cols: _Side | None = None
+    pixel_pitch_m: Annotated[float, Range(gt=0, le=1e-2)] | None = None
+    fill_factor: Annotated[float, Range(gt=0, le=1)] | None = None
+    well_capacity_e: Positive | None = None
+    conversion_gain_v_per_e: Positive | None = None
+    voltage_swing_v: Positive | None = None
+    dark_current_e_per_s: NonNegative | None = None
+    read_noise_e: NonNegative | None = None
+    dsnu_v: NonNegative | None = None
+    prnu_fraction: Fraction | None = None
+    analog_gain_ratio: Positive | None = None
+    analog_offset_v: NonNegative | None = None
+    adc_bits: Annotated[int, Range(ge=1, le=16, whole=True)] | None = None
+    serial: Annotated[int, Range(ge=0, le=2**53, whole=True)] | None = None
+
+    def overrides(self) -> dict[str, int | float]:
+        """Return the numbers of the catalogue's model that the recipe replaces."""
+        own = {"name", "model", "exposure", "isp"}
+        return {key: value for key, value in self if key not in own and value is not None}
+
+
+class CameraDocument(Document):
+    """A pose, one lens, and the sensors that see through it."""
+
+    name: Name = "main"
+    pose: PoseDocument
+    lens: LensDocument
+    sensors: list[SensorDocument] = Field(min_length=1, max_length=16)
