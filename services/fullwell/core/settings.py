@@ -1,0 +1,132 @@
+"""Settings of the service and its tools, read from environment variables that start with ``FULLWELL_``."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field, SecretStr, ValidationError, field_validator, model_validator
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
+
+from fullwell.core.errors import FieldError
+
+__all__ = ["Settings", "default_home", "load_settings"]
+
+MIB = 1 << 20
+
+
+def default_home() -> Path:
+    """Return the folder of the embedded service's state: the user's data directory, by the XDG rule."""
+    data = os.environ.get("XDG_DATA_HOME", "")
+    base = Path(data) if data.startswith("/") else Path.home() / ".local" / "share"
+    return base / "fullwell"
+
+
+class Settings(BaseSettings):
+    """Everything an operator can set. docs/service.md explains each one.
+
+    The three addresses `database_url`, `broker_url` and `store_url` are empty by default: then they mean the embedded
+    database, broker and folder below `home`.
+    """
+
+    model_config = SettingsConfigDict(env_prefix="FULLWELL_", extra="ignore", frozen=True)
+
+    home: Path = Field(default_factory=default_home)
+    database_url: str = ""
+    broker_url: str = ""
+    store_url: str = ""
+
+    host: str = "127.0.0.1"
+    port: int = Field(default=8000, ge=0, le=65535)
+    workers: int = Field(default=1, ge=0, le=256)
+    api_keys: Annotated[tuple[SecretStr, ...], NoDecode] = ()
+    allow_open: bool = False
+    allowed_hosts: Annotated[tuple[str, ...], NoDecode] = ()
+    presign_products: bool = False
+    max_request_bytes: int = Field(default=8 * MIB, ge=1024)
+    max_blob_bytes: int = Field(default=2048 * MIB, ge=1024)
+    max_frames_per_job: int = Field(default=100_000, ge=1)
+
+    lease_s: float = Field(default=30.0, ge=1.0, le=3600.0)
+    reap_interval_s: float = Field(default=2.0, ge=0.1, le=60.0)
+    max_attempts: int = Field(default=3, ge=1, le=100)
+    retry_delay_s: float = Field(default=2.0, ge=0.0, le=3600.0)
+    frame_time_limit_s: float = Field(default=3000.0, ge=1.0)
+
+    queue: str = Field(default="fullwell", pattern=r"^[A-Za-z0-9_.-]{1,64}$")
+    visibility_timeout_s: int = Field(default=3600, ge=10)
+    soft_shutdown_s: float = Field(default=20.0, ge=0.0)
+    max_tasks_per_child: int = Field(default=200, ge=1)
+    max_memory_per_child_mib: int = Field(default=8192, ge=256)
+    worker_health_file: Path | None = None
+
+    url: str = ""
+    api_key: SecretStr = SecretStr("")
+
+    @field_validator("api_keys", "allowed_hosts", mode="before")
+    @classmethod
+    def _split_commas(cls, value: Any) -> Any:
+        return tuple(part.strip() for part in value.split(",") if part.strip()) if isinstance(value, str) else value
+
+    @field_validator("home", mode="after")
+    @classmethod
+    def _absolute_home(cls, value: Path) -> Path:
+        return value.expanduser().absolute()
+
+    @field_validator("api_keys", mode="after")
+    @classmethod
+    def _long_keys(cls, value: tuple[SecretStr, ...]) -> tuple[SecretStr, ...]:
+        if any(len(key.get_secret_value()) < 8 for key in value):
+            raise ValueError("an API key must have at least 8 characters")
+        return value
+
+    @model_validator(mode="after")
+    def _time_limit_below_visibility(self) -> Settings:
+        if self.frame_time_limit_s > self.visibility_timeout_s:
+            raise ValueError("frame_time_limit_s must not be longer than visibility_timeout_s")
+        return self
+
+    @property
+    def database(self) -> str:
+        """The database's address: as set, or the SQLite file below `home`."""
+        return self.database_url or f"sqlite:///{self.home / 'fullwell.sqlite3'}"
+
+    @property
+    def store(self) -> str:
+        """The object store's address: as set, or the folder below `home`."""
+        return self.store_url or f"file://{self.home / 'store'}"
+
+    @property
+    def health_file(self) -> Path:
+        """The file whose age tells whether the worker lives."""
+        return self.worker_health_file or self.home / "run" / "worker.health"
+
+    @property
+    def client_url(self) -> str:
+        """Where commands look for the service."""
+        return self.url or f"http://{self.host if self.host not in ('0.0.0.0', '::') else '127.0.0.1'}:{self.port}"
+
+    @property
+    def is_loopback(self) -> bool:
+        """Whether the API can be reached from this machine only."""
+        return self.host in ("localhost", "::1") or self.host.startswith("127.")
+
+
+def load_settings(**overrides: Any) -> Settings:
+    """Return the settings of this process's environment; keyword arguments (not None) win over variables.
+
+    Raises
+    ------
+    FieldError
+        A variable has an illegal value; the message names the variable.
+    """
+    given = {name: value for name, value in overrides.items() if value is not None}
+    try:
+        return Settings(**given)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        name = str(first["loc"][0]) if first["loc"] else ""
+        variable = f"FULLWELL_{name.upper()}" if name else "the environment"
+        shown = "" if "key" in name else f" is {first.get('input')!r}"
+        raise FieldError(f"{variable}{shown}: {first['msg']}. Set {variable} to a legal value.", path=name) from None

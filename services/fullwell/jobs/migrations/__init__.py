@@ -1,0 +1,1 @@
+"""History of the job database's schema (Alembic)."""
