@@ -152,6 +152,8 @@ def _read_with_trimesh(source: ModelSource, suffix: str, warnings: list[str]) ->
     check: Callable[[ModelSource, bytes, ConfinedFiles], bytes] = PREFLIGHT[suffix]
     content = check(source, content, files)
     meshes = _trimesh_meshes(source, suffix, content, files)
+    if files.refusal is not None:
+        raise files.refusal
     drafts: list[PartDraft] = []
     triangles = 0
     for name, mesh, transform in meshes:

@@ -76,5 +76,5 @@ def _provenance() -> tuple[str, str]:
     except metadata.PackageNotFoundError:
         # A build of SUMO on the import path without package metadata; its licence is the project's.
         return "EPL-2.0 OR GPL-2.0-or-later", "Eclipse SUMO"
-    licence = package.get("License-Expression") or package.get("License") or "EPL-2.0 OR GPL-2.0-or-later"
-    return licence, f"Eclipse SUMO {package.get('Version', '')}".strip()
+    stated = next((package[key] for key in ("License-Expression", "License") if key in package), None)
+    return stated or "EPL-2.0 OR GPL-2.0-or-later", f"Eclipse SUMO {package['Version']}"

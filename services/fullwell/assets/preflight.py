@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import re
 import struct
@@ -10,12 +11,16 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 from urllib.parse import unquote
 
-from fullwell.assets.model import ModelSource
+from PIL import Image
+
+from fullwell.assets.model import ModelError, ModelSource
 
 __all__ = ["PREFLIGHT", "ConfinedFiles", "confined_path"]
 
 _GLTF_READ_EXTENSIONS = frozenset({"KHR_draco_mesh_compression", "KHR_materials_unlit", "EXT_texture_webp"})
 """Extensions that may be *required*; others would leave the geometry or its colours wrong."""
+
+_IMAGE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tga", ".bmp", ".webp", ".tif", ".tiff"})
 
 _ACCESSOR_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 
@@ -53,9 +58,18 @@ class ConfinedFiles:
         self._warnings = warnings
         self._base = source.file.parent
         self._root = source.root or source.file.parent
+        self.refusal: ModelError | None = None
+        """The first refusal: parsers may swallow what `read` raises, so the caller looks here afterwards."""
 
     def read(self, reference: str) -> bytes:
         """Return the bytes of a referred file; FileNotFoundError where it is missing (noted as a warning)."""
+        try:
+            return self._read(reference)
+        except ModelError as error:
+            self.refusal = self.refusal or error
+            raise
+
+    def _read(self, reference: str) -> bytes:
         target = confined_path(self._source, reference, base=self._base, root=self._root)
         if not target.is_file():
             plain = unquote(reference)
@@ -69,7 +83,18 @@ class ConfinedFiles:
             raise self._source.error(
                 f"refers to {_short(reference)}, which has more than {self._source.max_bytes} bytes", "Make it smaller"
             )
-        return target.read_bytes()
+        content = target.read_bytes()
+        if target.suffix.lower() in _IMAGE_SUFFIXES:
+            self._check_image(reference, content)
+        return content
+
+    def _check_image(self, reference: str, content: bytes) -> None:
+        try:
+            Image.open(io.BytesIO(content)).close()
+        except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+            raise self._source.error(
+                f"refers to {_short(reference)}, which is not a readable image ({error})", "Export the texture again"
+            ) from error
 
     def check(self, reference: str) -> None:
         """Raise ModelError where the reference is not allowed; a missing file is not an error here."""

@@ -81,9 +81,11 @@ def read_usd(source: ModelSource) -> UsdStage:
         del delegate
 
 
-def _first_line(error: Exception) -> str:
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    return next((line for line in lines if "Error in" not in line), lines[0] if lines else type(error).__name__)[:200]
+def _first_line(error: Any) -> str:
+    """What USD says, without the source location of its own code."""
+    said = [str(item.commentary) for item in getattr(error, "args", ()) if hasattr(item, "commentary")]
+    lines = "\n".join(said or [str(error)]).strip().splitlines()
+    return lines[0].strip()[:200] if lines else type(error).__name__
 
 
 def _read_stage(reading: _Reading) -> UsdStage:
@@ -97,9 +99,11 @@ def _read_stage(reading: _Reading) -> UsdStage:
     layer.Reload()
     _check_references(reading, file)
     stage = Usd.Stage.Open(layer, Usd.Stage.LoadAll)
-    errors = stage.GetCompositionErrors()
-    if errors:
-        raise reading.source.error(f"cannot be composed ({_first_line(Exception(str(errors[0])))})", "Repair its references")
+    for error in stage.GetCompositionErrors():
+        # A connection to a prim outside its reference loses a material input; anything else loses geometry.
+        if "target path" not in str(error):
+            raise reading.source.error(f"cannot be composed ({_first_line(error)})", "Repair its references")
+        reading.warn(_first_line(error))
     unit_m = float(UsdGeom.GetStageMetersPerUnit(stage))
     if not stage.HasAuthoredMetadata(UsdGeom.Tokens.metersPerUnit):
         reading.warn(f"the layer states no metersPerUnit; USD's default of {unit_m:g} m is taken. Set unit_m.")
