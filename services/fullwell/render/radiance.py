@@ -14,7 +14,7 @@ from fullwell.core.constants import NM_PER_M, PLANCK_J_S, SPEED_OF_LIGHT_M_PER_S
 from fullwell.core.errors import CancelledError, FullwellError, RenderError
 from fullwell.core.rng import seed32
 from fullwell.radiometry import RadianceImage, WavelengthGrid
-from fullwell.render.rays import lens_rays
+from fullwell.render.rays import CameraRays
 from fullwell.render.translate import TranslatedScene, translate
 from fullwell.render.variant import activate
 from fullwell.scene import Camera, SceneDescription
@@ -85,12 +85,10 @@ def render_radiance(
     started, cpu_started = time.perf_counter(), time.process_time()
     mi = activate()
     translated = translate(mi, scene, camera.camera_to_world[:3, 3])
+    task = _Task(mi, translated, camera, grid, samples_per_pixel, max_depth, seed)
     report = _Reporter(progress, should_cancel)
     try:
-        if mi.variant().startswith("llvm"):
-            film = _render_wavefront(mi, translated, camera, grid, samples_per_pixel, max_depth, seed, report)
-        else:
-            film = _render_scalar(mi, translated, camera, grid, samples_per_pixel, max_depth, seed, report)
+        film = _render_wavefront(task, report) if mi.variant().startswith("llvm") else _render_scalar(task, report)
     except FullwellError:
         raise
     except Exception as error:
@@ -104,6 +102,24 @@ def render_radiance(
         variant=str(mi.variant()),
     )
     return film.image(camera, grid), statistics
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Task:
+    """What one call renders."""
+
+    mi: Any
+    translated: TranslatedScene
+    camera: Camera
+    grid: WavelengthGrid
+    samples_per_pixel: int
+    max_depth: int
+    seed: int
+
+    @property
+    def pixels(self) -> int:
+        """Number of film samples."""
+        return self.camera.film.rows * self.camera.film.cols
 
 
 class _Reporter:
@@ -178,42 +194,8 @@ def _plan_passes(samples_per_pixel: int) -> tuple[int, int]:
     return -(-samples_per_pixel // per_pass), per_pass
 
 
-def _render_wavefront(
-    mi: Any,
-    translated: TranslatedScene,
-    camera: Camera,
-    grid: WavelengthGrid,
-    samples_per_pixel: int,
-    max_depth: int,
-    seed: int,
-    report: _Reporter,
-) -> _Film:
-    pixels = camera.film.rows * camera.film.cols
-    integrator = mi.load_dict({"type": "path", "max_depth": max_depth})
-    sampler = mi.load_dict({"type": "multijitter", "sample_count": 1})
-    passes, per_pass = _plan_passes(samples_per_pixel)
-    sampler.set_sample_count(per_pass)
-    per_pass = int(sampler.sample_count())
-    film = _Film(pixels, grid.count)
-    film.passes, film.samples = passes, passes * per_pass
-    chunk = max(1, _MAX_LANES // per_pass)
-    chunks = -(-pixels // chunk)
-    offsets = _band_offsets(pixels, grid.count, seed)
-    report(0.0)
-    for number in range(passes):
-        for piece in range(chunks):
-            first, last = piece * chunk, min(pixels, (piece + 1) * chunk)
-            lanes = _Lanes(first, last, per_pass, number * per_pass, seed32(seed, "render", number, piece))
-            _accumulate(mi, translated, integrator, sampler, camera, grid, lanes, offsets, film)
-            report((number * chunks + piece + 1) / (passes * chunks))
-    for rows in _slices(pixels, 1 << 16):
-        counts = _band_counts(offsets[rows], grid.count, 0, film.samples)
-        film.totals[rows] *= _normalisation(counts, grid.count, film.samples)
-    return film
-
-
 @dataclass(frozen=True, slots=True)
-class _Lanes:
+class _Launch:
     """Pixels [first, last), each with `per_pass` samples numbered from `first_sample`, and the launch's seed."""
 
     first: int
@@ -222,84 +204,118 @@ class _Lanes:
     first_sample: int
     seed: int
 
+    @property
+    def pixels(self) -> int:
+        """Number of pixels."""
+        return self.last - self.first
 
-def _accumulate(
-    mi: Any,
-    translated: TranslatedScene,
-    integrator: Any,
-    sampler: Any,
-    camera: Camera,
-    grid: WavelengthGrid,
-    lanes: _Lanes,
-    offsets: NDArray[np.uint32],
-    film: _Film,
-) -> None:
+    @property
+    def lanes(self) -> int:
+        """Number of camera rays."""
+        return self.pixels * self.per_pass
+
+
+def _render_wavefront(task: _Task, report: _Reporter) -> _Film:
+    tracer = _Tracer(task)
+    passes, per_pass = tracer.passes, tracer.per_pass
+    film = _Film(task.pixels, task.grid.count)
+    film.passes, film.samples = passes, passes * per_pass
+    chunk = max(1, _MAX_LANES // per_pass)
+    chunks = -(-task.pixels // chunk)
+    report(0.0)
+    for number in range(passes):
+        for piece in range(chunks):
+            first, last = piece * chunk, min(task.pixels, (piece + 1) * chunk)
+            launch = _Launch(first, last, per_pass, number * per_pass, seed32(task.seed, "render", number, piece))
+            _accumulate(tracer, launch, film)
+            report((number * chunks + piece + 1) / (passes * chunks))
+    for rows in _slices(task.pixels, 1 << 16):
+        counts = _band_counts(tracer.offsets[rows], task.grid.count, 0, film.samples)
+        film.totals[rows] *= _normalisation(counts, film.samples)
+    return film
+
+
+def _accumulate(tracer: _Tracer, launch: _Launch, film: _Film) -> None:
     """Trace one launch and add its samples to the film.
 
     The samples of a pixel stand side by side and are summed in that order in double precision, so that no sum depends on
     thread order.
     """
-    pixel_count = lanes.last - lanes.first
-    values, bands = _trace(mi, translated, integrator, sampler, camera, grid, lanes, offsets)
+    values, bands = tracer.trace(launch)
     good = np.isfinite(values) & (values >= 0)
     bad = int(values.size - np.count_nonzero(good))
     if bad:
         film.bad_samples += bad
-        values = np.where(good, values, 0.0)
-    pixel = np.repeat(np.arange(pixel_count, dtype=np.int64) * grid.count, lanes.per_pass)
-    sums = np.zeros(pixel_count * grid.count)
-    for hero in range(_HERO_WAVELENGTHS):
-        sums += np.bincount(pixel + bands[hero], weights=values[hero], minlength=sums.size)
-    cube = sums.reshape(pixel_count, grid.count)
-    film.totals[lanes.first : lanes.last] += cube
-    part_offsets = offsets[lanes.first : lanes.last]
-    counts = _band_counts(part_offsets, grid.count, lanes.first_sample, lanes.per_pass)
-    film.add_pass_means(lanes.first, np.sum(cube * _normalisation(counts, grid.count, lanes.per_pass), axis=1))
+        values = np.where(good, values, np.float32(0.0))
+    band_count = film.totals.shape[1]
+    pixel = np.repeat(np.arange(launch.pixels, dtype=np.int64) * band_count, launch.per_pass)
+    sums = np.zeros(launch.pixels * band_count)
+    for value, band in zip(values, bands, strict=True):
+        sums += np.bincount(pixel + band, weights=value, minlength=sums.size)
+    cube = sums.reshape(launch.pixels, band_count)
+    film.totals[launch.first : launch.last] += cube
+    counts = _band_counts(tracer.offsets[launch.first : launch.last], band_count, launch.first_sample, launch.per_pass)
+    film.add_pass_means(launch.first, np.sum(cube * _normalisation(counts, launch.per_pass), axis=1))
 
 
-def _trace(
-    mi: Any,
-    translated: TranslatedScene,
-    integrator: Any,
-    sampler: Any,
-    camera: Camera,
-    grid: WavelengthGrid,
-    lanes: _Lanes,
-    offsets: NDArray[np.uint32],
-) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    """Return ((4, lanes) photon radiance samples, (4, lanes) their bands)."""
-    import drjit as dr  # noqa: PLC0415 - the renderer is loaded late
+class _Tracer:
+    """Mitsuba's path integrator, fed with this module's camera rays and wavelengths."""
 
-    pixel_count = lanes.last - lanes.first
-    sampler.set_samples_per_wavefront(lanes.per_pass)
-    sampler.seed(lanes.seed, pixel_count * lanes.per_pass)
-    lane = dr.arange(mi.UInt32, pixel_count * lanes.per_pass)
-    per_pass = dr.opaque(mi.UInt32, lanes.per_pass)
-    local = lane // per_pass
-    sample = lane - local * per_pass + dr.opaque(mi.UInt32, lanes.first_sample)
-    pixel = local + dr.opaque(mi.UInt32, lanes.first)
-    cols = dr.opaque(mi.UInt32, camera.film.cols)
-    row = pixel // cols
-    jitter = sampler.next_2d()
-    x_px, y_px = mi.Float(pixel - row * cols) + jitter.x, mi.Float(row) + jitter.y
-    origin, direction = lens_rays(mi, dr, camera, x_px, y_px, sampler.next_2d())
-    within_band = sampler.next_1d()
-    band_count = dr.opaque(mi.UInt32, grid.count)
-    offset = dr.gather(mi.UInt32, mi.UInt32(offsets), pixel)
-    first_nm, step_nm = dr.opaque(mi.Float, grid.first_nm - grid.step_nm / 2), dr.opaque(mi.Float, grid.step_nm)
-    bands, wavelengths = [], []
-    for shift in _hero_shifts(grid.count):
-        position = sample + offset + dr.opaque(mi.UInt32, shift)
-        band = position - (position // band_count) * band_count
-        bands.append(band)
-        wavelengths.append(first_nm + step_nm * (mi.Float(band) + within_band))
-    ray = mi.RayDifferential3f(o=origin, d=direction, time=0.0, wavelengths=mi.Spectrum(*wavelengths))
-    radiance, _, _ = integrator.sample(translated.scene, sampler, ray)
-    photons = radiance * ray.wavelengths * _PHOTONS_PER_J_NM
-    dr.eval(photons, *bands)
-    lane_count = pixel_count * lanes.per_pass
-    values = np.stack([np.broadcast_to(np.asarray(photons[h].numpy()), lane_count) for h in range(_HERO_WAVELENGTHS)])
-    return values, np.stack([np.asarray(band.numpy(), dtype=np.int64) for band in bands])
+    def __init__(self, task: _Task) -> None:
+        mi = task.mi
+        self._task = task
+        self._integrator = mi.load_dict({"type": "path", "max_depth": task.max_depth})
+        self._sampler = mi.load_dict({"type": "multijitter", "sample_count": 1})
+        self.passes, wanted = _plan_passes(task.samples_per_pixel)
+        self._sampler.set_sample_count(wanted)
+        self.per_pass = int(self._sampler.sample_count())
+        self.offsets = _band_offsets(task.pixels, task.grid.count, task.seed)
+        self._offsets = mi.UInt32(self.offsets)
+        self._rays = CameraRays(mi, task.camera)
+
+    def trace(self, launch: _Launch) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+        """Return ((4, lanes) photon radiance samples, (4, lanes) their bands)."""
+        import drjit as dr  # noqa: PLC0415 - the renderer is loaded late
+
+        mi, sampler = self._task.mi, self._sampler
+        sampler.set_samples_per_wavefront(launch.per_pass)
+        sampler.seed(launch.seed, launch.lanes)
+        pixel, sample = self._indices(launch)
+        cols = dr.opaque(mi.UInt32, self._task.camera.film.cols)
+        row = pixel // cols
+        jitter = sampler.next_2d()
+        x_px, y_px = mi.Float(pixel - row * cols) + jitter.x, mi.Float(row) + jitter.y
+        origin, direction = self._rays.through_lens(x_px, y_px, sampler.next_2d())
+        bands, wavelengths = self._wavelengths(pixel, sample, sampler.next_1d())
+        ray = mi.RayDifferential3f(o=origin, d=direction, time=0.0, wavelengths=wavelengths)
+        radiance, _, _ = self._integrator.sample(self._task.translated.scene, sampler, ray)
+        photons = radiance * wavelengths * _PHOTONS_PER_J_NM
+        dr.eval(photons, *bands)
+        values = np.stack([np.broadcast_to(photons[hero].numpy(), launch.lanes) for hero in range(_HERO_WAVELENGTHS)])
+        return values, np.stack([np.asarray(band.numpy(), dtype=np.int64) for band in bands])
+
+    def _indices(self, launch: _Launch) -> tuple[Any, Any]:
+        import drjit as dr  # noqa: PLC0415
+
+        mi = self._task.mi
+        lane = dr.arange(mi.UInt32, launch.lanes)
+        per_pass = dr.opaque(mi.UInt32, launch.per_pass)
+        local = lane // per_pass
+        sample = lane - local * per_pass + dr.opaque(mi.UInt32, launch.first_sample)
+        return local + dr.opaque(mi.UInt32, launch.first), sample
+
+    def _wavelengths(self, pixel: Any, sample: Any, within_band: Any) -> tuple[list[Any], Any]:
+        import drjit as dr  # noqa: PLC0415
+
+        mi, grid = self._task.mi, self._task.grid
+        band_count = dr.opaque(mi.UInt32, grid.count)
+        offset = dr.gather(mi.UInt32, self._offsets, pixel)
+        first_nm, step_nm = dr.opaque(mi.Float, grid.first_nm - grid.step_nm / 2), dr.opaque(mi.Float, grid.step_nm)
+        bands = []
+        for shift in _hero_shifts(grid.count):
+            position = sample + offset + dr.opaque(mi.UInt32, shift)
+            bands.append(position - (position // band_count) * band_count)
+        return bands, mi.Spectrum(*(first_nm + step_nm * (mi.Float(band) + within_band) for band in bands))
 
 
 # Every camera ray carries four wavelengths. Which bands they fall into is decided by counting, not by chance: sample s of a
@@ -328,16 +344,15 @@ def _band_counts(offsets: NDArray[np.uint32], bands: int, first_sample: int, sam
     return counts
 
 
-def _normalisation(counts: NDArray[np.int64], bands: int, samples: int) -> NDArray[np.float64]:
+def _normalisation(counts: NDArray[np.int64], samples: int) -> NDArray[np.float64]:
     """Return (pixels, bands) factors from sums to band means.
 
     Where every band of a pixel has a sample, 1/count. Otherwise the expected count: right on average over pixels, since the
     offsets are uniform, at the price of empty bands.
     """
-    expected = samples * _HERO_WAVELENGTHS / bands
     if counts.min() > 0:
         return 1.0 / counts
-    return np.full(counts.shape, 1.0 / expected)
+    return np.full(counts.shape, counts.shape[1] / (samples * _HERO_WAVELENGTHS))
 
 
 def _slices(total: int, size: int) -> Iterator[slice]:
@@ -348,29 +363,19 @@ def _slices(total: int, size: int) -> Iterator[slice]:
 # Scalar fallback -----------------------------------------------------------------------------------------------------
 
 
-def _render_scalar(
-    mi: Any,
-    translated: TranslatedScene,
-    camera: Camera,
-    grid: WavelengthGrid,
-    samples_per_pixel: int,
-    max_depth: int,
-    seed: int,
-    report: _Reporter,
-) -> _Film:
+def _render_scalar(task: _Task, report: _Reporter) -> _Film:
     """Render with the renderer's own film, for machines without a usable LLVM (about a third of the speed)."""
-    passes, per_pass = _plan_passes(samples_per_pixel)
-    film = _Film(camera.film.rows * camera.film.cols, grid.count)
+    passes, per_pass = _plan_passes(task.samples_per_pixel)
+    film = _Film(task.pixels, task.grid.count)
     film.passes = passes
-    integrator = mi.load_dict({"type": "path", "max_depth": max_depth})
-    sensor = mi.load_dict(_scalar_sensor(mi, camera, grid, per_pass))
+    integrator = task.mi.load_dict({"type": "path", "max_depth": task.max_depth})
+    sensor = task.mi.load_dict(_scalar_sensor(task.mi, task.camera, task.grid, per_pass))
     film.samples = passes * int(sensor.sampler().sample_count())
     report(0.0)
     for number in range(passes):
-        image = np.array(
-            mi.render(translated.scene, sensor=sensor, integrator=integrator, seed=seed32(seed, "render", number)),
-            dtype=np.float64,
-        ).reshape(-1, grid.count)
+        seed = seed32(task.seed, "render", number)
+        rendered = task.mi.render(task.translated.scene, sensor=sensor, integrator=integrator, seed=seed)
+        image = np.array(rendered, dtype=np.float64).reshape(-1, task.grid.count)
         good = np.isfinite(image) & (image >= 0)
         film.bad_samples += int(image.size - np.count_nonzero(good))
         image = np.where(good, image, 0.0)

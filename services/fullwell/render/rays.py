@@ -6,54 +6,55 @@ from typing import Any
 
 from fullwell.scene import Camera
 
-__all__ = ["lens_rays", "pinhole_direction"]
+__all__ = ["CameraRays"]
 
 
-def pinhole_direction(mi: Any, dr: Any, camera: Camera, x_px: Any, y_px: Any) -> tuple[Any, Any]:
-    """Return (direction in world axes, unit; cosine to the optical axis) of the chief ray at film position (x, y) [px].
+class CameraRays:
+    """Rays of one camera in the active renderer's arrays, from the centre of the entrance pupil at the origin.
 
-    Positions run from (0, 0) at the top-left corner of the film; pixel centres are at +0.5.
+    Film positions run from (0, 0) at the top-left corner [px]; pixel centres are at +0.5. All numbers of the camera go to
+    the kernels as data: written into their code, another camera would compile another kernel.
     """
-    x, y = _tangents(mi, dr, camera, x_px, y_px)
-    cosine = dr.rsqrt(x * x + y * y + 1.0)
-    return _to_world(mi, dr, camera, x * cosine, y * cosine, cosine), cosine
 
+    def __init__(self, mi: Any, camera: Camera) -> None:
+        import drjit as dr  # noqa: PLC0415 - the renderer is loaded late
 
-def lens_rays(mi: Any, dr: Any, camera: Camera, x_px: Any, y_px: Any, lens_uv: Any) -> tuple[Any, Any]:
-    """Return (origin, unit direction) of rays from the entrance pupil; the origin is relative to the pupil's centre.
+        self._mi, self._dr = mi, dr
+        self._pinhole = camera.lens.kind == "pinhole"
+        self._pitch = self._data(camera.tangent_pitch)
+        self._centre_x, self._centre_y = self._data(camera.film.cols / 2), self._data(camera.film.rows / 2)
+        self._pupil_radius_m = self._data(0.5 * camera.lens.pupil_diameter_m)
+        self._nearness = self._data(1.0 / camera.lens.focus_distance_m)
+        self._rotation = [[self._data(v) for v in row] for row in camera.camera_to_world[:3, :3]]
 
-    A pinhole sends all rays through the centre. A thin lens spreads them over the pupil disk (`lens_uv` in [0, 1)^2) so that
-    they meet again on the plane in focus.
-    """
-    if camera.lens.kind == "pinhole":
-        direction, _ = pinhole_direction(mi, dr, camera, x_px, y_px)
-        return dr.zeros(mi.Point3f, dr.width(direction)), direction
-    x, y = _tangents(mi, dr, camera, x_px, y_px)
-    disk = mi.warp.square_to_uniform_disk_concentric(lens_uv) * _opaque(mi, dr, 0.5 * camera.lens.pupil_diameter_m)
-    # The point in focus is d * (x, y, 1); dividing the difference by d keeps a focus at infinity finite.
-    nearness = _opaque(mi, dr, 1.0 / camera.lens.focus_distance_m)
-    dx, dy = x - disk.x * nearness, y - disk.y * nearness
-    scale = dr.rsqrt(dx * dx + dy * dy + 1.0)
-    origin = _to_world(mi, dr, camera, disk.x, disk.y, mi.Float(0.0))
-    return mi.Point3f(origin), _to_world(mi, dr, camera, dx * scale, dy * scale, scale)
+    def _data(self, value: float) -> Any:
+        return self._dr.opaque(self._mi.Float, float(value))
 
+    def _tangents(self, x_px: Any, y_px: Any) -> tuple[Any, Any]:
+        return (x_px - self._centre_x) * self._pitch, (y_px - self._centre_y) * self._pitch
 
-def _opaque(mi: Any, dr: Any, value: float) -> Any:
-    """Pass a number to the kernel as data: written into its code, another camera would compile another kernel."""
-    return dr.opaque(mi.Float, float(value))
+    def _to_world(self, x: Any, y: Any, z: Any) -> Any:
+        return self._mi.Vector3f(*(row[0] * x + row[1] * y + row[2] * z for row in self._rotation))
 
+    def chief(self, x_px: Any, y_px: Any) -> Any:
+        """Return the unit directions, in world axes, of the rays through the centre of the pupil."""
+        x, y = self._tangents(x_px, y_px)
+        scale = self._dr.rsqrt(x * x + y * y + 1.0)
+        return self._to_world(x * scale, y * scale, scale)
 
-def _tangents(mi: Any, dr: Any, camera: Camera, x_px: Any, y_px: Any) -> tuple[Any, Any]:
-    pitch = _opaque(mi, dr, camera.tangent_pitch)
-    x = (x_px - _opaque(mi, dr, camera.film.cols / 2)) * pitch
-    y = (y_px - _opaque(mi, dr, camera.film.rows / 2)) * pitch
-    return x, y
+    def through_lens(self, x_px: Any, y_px: Any, lens_uv: Any) -> tuple[Any, Any]:
+        """Return (origins, unit directions) of rays through the points `lens_uv` in [0, 1)^2 of the entrance pupil.
 
-
-def _to_world(mi: Any, dr: Any, camera: Camera, x: Any, y: Any, z: Any) -> Any:
-    r = [[_opaque(mi, dr, v) for v in row] for row in camera.camera_to_world[:3, :3]]
-    return mi.Vector3f(
-        r[0][0] * x + r[0][1] * y + r[0][2] * z,
-        r[1][0] * x + r[1][1] * y + r[1][2] * z,
-        r[2][0] * x + r[2][1] * y + r[2][2] * z,
-    )
+        A pinhole sends all rays through the centre. A thin lens spreads them evenly over the pupil's disk, so that they
+        meet again on the plane in focus.
+        """
+        if self._pinhole:
+            direction = self.chief(x_px, y_px)
+            return self._dr.zeros(self._mi.Point3f, self._dr.width(direction)), direction
+        x, y = self._tangents(x_px, y_px)
+        disk = self._mi.warp.square_to_uniform_disk_concentric(lens_uv) * self._pupil_radius_m
+        # The point in focus is d * (x, y, 1); dividing the difference by d keeps a focus at infinity finite.
+        dx, dy = x - disk.x * self._nearness, y - disk.y * self._nearness
+        scale = self._dr.rsqrt(dx * dx + dy * dy + 1.0)
+        origin = self._to_world(disk.x, disk.y, self._mi.Float(0.0))
+        return self._mi.Point3f(origin), self._to_world(dx * scale, dy * scale, scale)

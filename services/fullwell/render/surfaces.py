@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fullwell.core.errors import CancelledError, FullwellError, RenderError
-from fullwell.render.rays import pinhole_direction
+from fullwell.render.rays import CameraRays
 from fullwell.render.translate import TranslatedScene, translate
 from fullwell.render.variant import activate
 from fullwell.scene import Camera, SceneDescription, SurfaceHits
@@ -41,7 +41,7 @@ def query_surfaces(
     mi = activate()
     translated = translate(mi, scene, camera.camera_to_world[:3, 3])
     try:
-        kind = _WavefrontCaster if mi.variant().startswith("llvm") else _ScalarCaster
+        kind: type[_WavefrontCaster | _ScalarCaster] = _WavefrontCaster if mi.variant().startswith("llvm") else _ScalarCaster
         return _collect(kind(mi, translated, camera), scene, camera, should_cancel)
     except FullwellError:
         raise
@@ -104,18 +104,17 @@ class _WavefrontCaster:
         cols = dr.opaque(mi.UInt32, camera.film.cols)
         row = lane // cols
         x_px, y_px = mi.Float(lane - row * cols) + 0.5, mi.Float(row) + 0.5
-        direction, _ = pinhole_direction(mi, dr, camera, x_px, y_px)
+        direction = CameraRays(mi, camera).chief(x_px, y_px)
         self._ray = mi.Ray3f(o=dr.zeros(mi.Point3f, len(self._pixel)), d=direction)
         self._travelled = dr.zeros(mi.Float, len(self._pixel))
         self._object_of = self._lookup(translated)
 
     def _lookup(self, translated: TranslatedScene) -> NDArray[np.int32]:
-        registry = {
-            int(self._dr.reinterpret_array(self._mi.UInt32, self._mi.ShapePtr(shape))[0]): translated.object_of_shape[
-                shape.id()
-            ]
-            for shape in translated.scene.shapes()
-        }
+        mi, dr = self._mi, self._dr
+        registry: dict[int, int] = {}
+        for shape in translated.scene.shapes():
+            key: Any = dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))
+            registry[int(key[0])] = translated.object_of_shape[shape.id()]
         table = np.full(max(registry, default=0) + 1, -1, dtype=np.int32)
         for key, value in registry.items():
             table[key] = value
@@ -176,5 +175,5 @@ class _ScalarCaster:
         self._alive = onward
         if not found:
             return None
-        pixel, objects, ranges, normals = zip(*found, strict=True)
-        return _Layer(np.array(pixel), np.array(objects, dtype=np.int32), np.array(ranges), np.array(normals))
+        pixels, objects, ranges, normals = zip(*found, strict=True)
+        return _Layer(np.array(pixels), np.array(objects, dtype=np.int32), np.array(ranges), np.array(normals))

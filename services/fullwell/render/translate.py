@@ -162,7 +162,7 @@ def _bsdf(mi: Any, material: Material) -> dict[str, Any]:
                 }
             )
         case Conductor():
-            bsdf = {"type": "conductor", "eta": _spectrum(material.eta), "k": _spectrum(material.k)}
+            bsdf: dict[str, Any] = {"type": "conductor", "eta": _spectrum(material.eta), "k": _spectrum(material.k)}
             if material.roughness > 0:
                 bsdf |= {"type": "roughconductor", "alpha": float(material.roughness), "distribution": "ggx"}
             return _two_sided(bsdf)
@@ -171,10 +171,14 @@ def _bsdf(mi: Any, material: Material) -> dict[str, Any]:
                 {"type": "conductor", "material": "none", "specular_reflectance": _spectrum(material.reflectance)}
             )
         case Dielectric():
-            bsdf = {"type": "dielectric", "int_ior": material.interior_index, "ext_ior": material.exterior_index}
+            glass: dict[str, Any] = {
+                "type": "dielectric",
+                "int_ior": material.interior_index,
+                "ext_ior": material.exterior_index,
+            }
             if material.roughness > 0:
-                bsdf |= {"type": "roughdielectric", "alpha": float(material.roughness), "distribution": "ggx"}
-            return bsdf
+                glass |= {"type": "roughdielectric", "alpha": float(material.roughness), "distribution": "ggx"}
+            return glass
 
 
 # Shapes --------------------------------------------------------------------------------------------------------------

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -66,27 +71,19 @@ def look_at_plane() -> np.ndarray:
     return turned
 
 
-def test_scalar_and_compiled_queries_agree(monkeypatch: pytest.MonkeyPatch) -> None:
-    import subprocess
-    import sys
+QUERY = """
+import sys; sys.path.insert(0, sys.argv[1])
+import numpy as np
+import test_surfaces as t
+scene = t.SceneDescription((t.placed("a", t.Sphere(1.0)), t.placed("b", t.Cube((4, 0.1, 3)), y=2.0)))
+hits = t.query_surfaces(scene, t.camera())
+print((hits.object_index + 1).sum(), hits.amodal_px.tolist(), round(float(hits.range_m[np.isfinite(hits.range_m)].sum()), 1))
+"""
 
-    code = (
-        "import sys; sys.path.insert(0, sys.argv[1]); import test_surfaces as t, numpy as np; "
-        "s = t.SceneDescription((t.placed('a', t.Sphere(1.0)), t.placed('b', t.Cube((4, 0.1, 3)), y=2.0))); "
-        "h = t.query_surfaces(s, t.camera()); "
-        "print((h.object_index + 1).sum(), h.amodal_px.tolist(), round(float(h.range_m[np.isfinite(h.range_m)].sum()), 1))"
-    )
-    from pathlib import Path
 
-    def run(variant: str | None) -> str:
-        import os
+def test_scalar_and_compiled_queries_agree() -> None:
+    def run(**variables: str) -> str:
+        command = [sys.executable, "-c", QUERY, str(Path(__file__).parent)]
+        return subprocess.run(command, env={**os.environ, **variables}, check=True, capture_output=True, text=True).stdout
 
-        environment = dict(os.environ)
-        if variant:
-            environment["FULLWELL_VARIANT"] = variant
-        here = str(Path(__file__).parent)
-        return subprocess.run(
-            [sys.executable, "-c", code, here], env=environment, check=True, capture_output=True, text=True
-        ).stdout
-
-    assert run("scalar_spectral") == run(None)
+    assert run(FULLWELL_VARIANT="scalar_spectral") == run()
