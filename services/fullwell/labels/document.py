@@ -1,0 +1,52 @@
+"""Labels as the document that is published."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fullwell.labels.model import Labels, ObjectLabel
+
+__all__ = ["labels_document"]
+
+_DECIMALS = 6
+"""Micrometres and millionths of a pixel; what lies beyond is float noise that would only make files differ."""
+
+
+def labels_document(labels: Labels, intrinsics_px: Any, camera_to_world: Any) -> dict[str, Any]:
+    """Return `labels.json` as plain data: boxes in pixels, lengths in metres, camera axes as OpenCV."""
+    rows, cols = labels.instances.shape
+    return {
+        "schema": "fullwell/labels/v1",
+        "image_size_px": [cols, rows],
+        "intrinsics_px": _numbers(intrinsics_px),
+        "camera_to_world": _numbers(camera_to_world),
+        "classes": [{"id": number + 1, "name": name} for number, name in enumerate(labels.semantic_classes)],
+        "objects": [_object_document(item) for item in labels.objects],
+    }
+
+
+def _object_document(item: ObjectLabel) -> dict[str, Any]:
+    return {
+        "id": item.id,
+        "instance": item.instance,
+        "class": item.semantic_class,
+        "class_id": item.class_id,
+        "bbox_visible_px": None if item.bbox_visible_px is None else list(item.bbox_visible_px),
+        "bbox_amodal_px": None if item.bbox_amodal_px is None else _numbers(item.bbox_amodal_px),
+        "visible_px": item.visible_px,
+        "amodal_px": item.amodal_px,
+        "visible_fraction": round(item.visible_fraction, _DECIMALS),
+        "truncated_fraction": round(item.truncated_fraction, _DECIMALS),
+        "box3d_camera": {
+            "center_m": _numbers(item.box3d.center_m),
+            "size_m": _numbers(item.box3d.size_m),
+            "rotation": _numbers(item.box3d.rotation),
+        },
+        "distance_m": round(float(np.linalg.norm(item.box3d.center_m)), _DECIMALS),
+    }
+
+
+def _numbers(values: Any) -> Any:
+    return (np.round(np.asarray(values, dtype=np.float64), _DECIMALS) + 0.0).tolist()
