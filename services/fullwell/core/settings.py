@@ -95,7 +95,7 @@ class Settings(BaseSettings):
     @property
     def store(self) -> str:
         """The object store's address: as set, or the folder below `home`."""
-        return self.store_url or f"file://{self.home / 'store'}"
+        return self.store_url or (self.home / "store").as_uri()
 
     @property
     def health_file(self) -> Path:

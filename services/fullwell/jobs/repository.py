@@ -241,8 +241,8 @@ class JobRepository:
     ) -> Lease | None:
         """Take the lease on a queued frame, or on a running one whose holder is dead or silent.
 
-        Returns None when there is nothing to do: the frame has ended, another worker holds it, or it has used up its
-        attempts and is failed now. A message that arrives twice therefore does no harm.
+        Returns None when there is nothing to do: the frame has ended, another worker holds it, it waits for its next try
+        (a message comes when that is due), or it is failed now. A message that arrives twice therefore does no harm.
         """
         with self._database.writing() as session:
             job = self._locked_job(session, job_id)
@@ -252,7 +252,7 @@ class JobRepository:
                 return None
             if row.state == FrameState.RUNNING and (cause := _reason_to_take_back(row, now)) is not None:
                 self._lose(session, job, row, cause=cause, rule=rule, now=now)
-            if row.state != FrameState.QUEUED or job.cancel_requested_at is not None:
+            if row.state != FrameState.QUEUED or row.not_before > now or job.cancel_requested_at is not None:
                 return None
             return self._start(session, job, row, worker=worker, holder=holder, lease_s=lease_s, now=now)
 

@@ -1,0 +1,225 @@
+"""One frame on a worker: lease, run with a heartbeat, record the outcome."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+import structlog
+
+from fullwell.core import (
+    AssetError,
+    CancelledError,
+    ConflictError,
+    FieldError,
+    FullwellError,
+    ServiceError,
+    ShapeError,
+)
+from fullwell.core.settings import Settings
+from fullwell.jobs.processes import current_process
+from fullwell.jobs.records import Lease, RetryRule
+from fullwell.jobs.repository import JobRepository
+from fullwell.schema import RecipeDocument, load_recipe
+from fullwell.storage import ObjectStore
+from fullwell_worker.materials import JobFolder
+
+__all__ = ["FrameRunner", "Heart", "WorkerContext", "frame_prefix", "frame_runner", "run_frames"]
+
+T = TypeVar("T")
+MAX_BEAT_S = 2.0
+PERMANENT = (FieldError, ShapeError, AssetError)
+"""Errors that the same recipe would meet again: such a frame is not tried twice."""
+
+log = structlog.get_logger("fullwell.worker")
+
+
+class FrameRunner(Protocol):
+    """What renders a frame and publishes its products, the manifest last."""
+
+    def __call__(
+        self,
+        document: RecipeDocument,
+        index: int,
+        store: ObjectStore,
+        prefix: str,
+        *,
+        base_dir: Path | None,
+        progress: Callable[[Any], None] | None,
+        should_cancel: Callable[[], bool] | None,
+    ) -> Any:
+        """Return when the frame's manifest is in the store."""
+        ...
+
+
+def _run_with_pipeline(
+    document: RecipeDocument,
+    index: int,
+    store: ObjectStore,
+    prefix: str,
+    *,
+    base_dir: Path | None,
+    progress: Callable[[Any], None] | None,
+    should_cancel: Callable[[], bool] | None,
+) -> Any:
+    from fullwell.pipeline import run_frame  # noqa: PLC0415 - loads the renderer: in the child, at its first frame
+
+    return run_frame(document, index, store, prefix, base_dir=base_dir, progress=progress, should_cancel=should_cancel)
+
+
+frame_runner: FrameRunner = _run_with_pipeline
+"""What runs a frame; tests of the service put a stand-in here."""
+
+
+def frame_prefix(job_id: str, number: int) -> str:
+    """Return the prefix of a frame's products in the object store."""
+    return f"jobs/{job_id}/frames/{number}/"
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerContext:
+    """What one worker process works with. Made after the fork."""
+
+    name: str
+    settings: Settings
+    repository: JobRepository
+    store: ObjectStore
+    folder: JobFolder
+
+    @property
+    def rule(self) -> RetryRule:
+        """How often a frame may end badly."""
+        return RetryRule(self.settings.max_attempts, self.settings.retry_delay_s)
+
+
+class Heart:
+    """A thread that prolongs the lease while a frame runs, reports its progress, and learns that it should stop."""
+
+    def __init__(self, repository: JobRepository, lease: Lease, *, lease_s: float) -> None:
+        self._repository = repository
+        self._lease = lease
+        self._lease_s = lease_s
+        self._progress = ("", 0.0)
+        self._stop_asked = threading.Event()
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._beat, name="lease", daemon=True)
+
+    def report(self, progress: Any) -> None:
+        """Take a FrameProgress; it goes to the database with the next beat."""
+        self._progress = (str(progress.stage), min(1.0, max(0.0, float(progress.fraction))))
+
+    def should_cancel(self) -> bool:
+        """Return whether the job was cancelled or the lease was lost; cheap, to be asked between passes."""
+        return self._stop_asked.is_set()
+
+    def __enter__(self) -> Heart:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        self._thread.join(timeout=30)
+
+    def _beat(self) -> None:
+        interval_s = min(MAX_BEAT_S, self._lease_s / 4)
+        while not self._ended.wait(interval_s):
+            stage, fraction = self._progress
+            try:
+                beat = self._repository.heartbeat(self._lease, lease_s=self._lease_s, stage=stage, fraction=fraction)
+            except ServiceError as error:
+                # Not a reason to stop: should the lease end meanwhile, whoever is first to publish wins.
+                log.warning("heartbeat failed", job=self._lease.job_id, frame=self._lease.number, cause=str(error))
+                continue
+            if beat.cancel_requested or not beat.still_held:
+                self._stop_asked.set()
+
+
+def run_frames(context: WorkerContext, job_id: str, numbers: list[int]) -> None:
+    """Run those of the frames that still need it."""
+    for number in numbers:
+        lease = context.repository.acquire(
+            job_id,
+            number,
+            worker=context.name,
+            holder=current_process(),
+            lease_s=context.settings.lease_s,
+            rule=context.rule,
+        )
+        if lease is None:
+            log.info("nothing to do", job=job_id, frame=number)
+            continue
+        with structlog.contextvars.bound_contextvars(job=job_id, frame=number, attempt=lease.attempt):
+            _run_leased(context, lease)
+
+
+def _run_leased(context: WorkerContext, lease: Lease) -> None:
+    started = time.monotonic()
+    log.info("frame started")
+    repository = context.repository
+    with Heart(repository, lease, lease_s=context.settings.lease_s) as heart, _outcome(context, lease, heart):
+        given = repository.input_of(lease.job_id)
+        document = load_recipe(given.recipe_json, overrides=json.loads(given.overrides_json))
+        base_dir = context.folder.prepare(lease.job_id, json.loads(given.files_json), context.store)
+        prefix = frame_prefix(lease.job_id, lease.number)
+        try:
+            frame_runner(
+                document,
+                lease.number,
+                context.store,
+                prefix,
+                base_dir=base_dir,
+                progress=heart.report,
+                should_cancel=heart.should_cancel,
+            )
+        except ConflictError:
+            # Another attempt has published the manifest first: the frame is done, by the other one's products.
+            if not context.store.exists(f"{prefix}manifest.json"):
+                raise
+        changed = _patiently(lambda: repository.complete(lease), context.settings.lease_s)
+        log.info("frame done" if changed else "frame was done already", seconds=round(time.monotonic() - started, 3))
+
+
+@contextlib.contextmanager
+def _outcome(context: WorkerContext, lease: Lease, heart: Heart) -> Iterator[None]:
+    """Turn what the block raises into the frame's recorded outcome."""
+    try:
+        yield
+    except CancelledError as error:
+        if heart.should_cancel():
+            log.info("frame stopped")
+            _patiently(lambda: context.repository.stop(lease), context.settings.lease_s)
+        else:
+            _record_failure(context, lease, str(error), error.code, retryable=True)
+    except FullwellError as error:
+        _record_failure(context, lease, str(error), error.code, retryable=not isinstance(error, PERMANENT))
+    except MemoryError:
+        _record_failure(context, lease, "the frame needs more memory than the worker has", "out_of_memory", retryable=True)
+    except Exception as error:  # a programming error in a stage must fail its frame, not the worker
+        log.exception("frame failed")
+        _record_failure(context, lease, f"{type(error).__name__}: {error}", "internal_error", retryable=True)
+
+
+def _record_failure(context: WorkerContext, lease: Lease, cause: str, code: str, *, retryable: bool) -> None:
+    log.warning("frame attempt failed", cause=cause, code=code, retryable=retryable)
+    _patiently(
+        lambda: context.repository.fail(lease, cause=cause, code=code, retryable=retryable, rule=context.rule),
+        context.settings.lease_s,
+    )
+
+
+def _patiently(action: Callable[[], T], patience_s: float) -> T:
+    """Return what `action` returns, trying again while the database is away, for `patience_s` at most."""
+    deadline = time.monotonic() + patience_s
+    while True:
+        try:
+            return action()
+        except ServiceError:
+            if time.monotonic() > deadline:
+                raise
+            time.sleep(0.5)
