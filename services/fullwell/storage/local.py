@@ -18,7 +18,7 @@ from fullwell.storage.protocol import CHUNK_BYTES, ObjectInfo, check_key, check_
 
 __all__ = ["LocalStore"]
 
-_ATTEMPTS = 10
+_ATTEMPTS = 100
 
 
 class LocalStore:
@@ -40,8 +40,8 @@ class LocalStore:
         target = self._file(key)
         if if_absent and target.exists():  # spares the writing; the link below is what decides
             raise _conflict(key)
-        with self._failing_as_storage_error("write", key), self._partial_of(target) as partial:
-            with partial.open("xb") as sink:
+        with self._failing_as_storage_error("write", key), self._partial_of(target) as (partial, sink):
+            with sink:
                 if isinstance(content, bytes | bytearray | memoryview):
                     sink.write(content)
                 else:
@@ -104,8 +104,11 @@ class LocalStore:
     def delete(self, key: str) -> None:
         """Remove an object; see ObjectStore.delete."""
         file = self._file(key)
-        with self._failing_as_storage_error("delete", key), contextlib.suppress(FileNotFoundError, IsADirectoryError):
-            file.unlink()
+        with self._failing_as_storage_error("delete", key):
+            try:
+                file.unlink()
+            except (FileNotFoundError, NotADirectoryError, IsADirectoryError):
+                return
         self._prune(file.parent)
 
     def delete_prefix(self, prefix: str) -> int:
@@ -162,23 +165,32 @@ class LocalStore:
                     yield _info(key, folder / entry.name)
 
     @contextlib.contextmanager
-    def _partial_of(self, target: Path) -> Iterator[Path]:
-        self._make_folder(target.parent)
+    def _partial_of(self, target: Path) -> Iterator[tuple[Path, BinaryIO]]:
         partial = target.with_name(f".{target.name}.{secrets.token_hex(8)}{PARTIAL_SUFFIX}")
-        try:
-            yield partial
-        finally:
-            partial.unlink(missing_ok=True)
+        with contextlib.ExitStack() as stack:
+            sink = stack.enter_context(self._create(partial))
+            try:
+                yield partial, sink
+            finally:
+                partial.unlink(missing_ok=True)
 
-    def _make_folder(self, folder: Path) -> None:
+    def _create(self, partial: Path) -> BinaryIO:
+        """Open a new file in a folder that is made where it is missing.
+
+        A deleter may prune the empty folder between the two steps, or between two steps of making it; then both are done
+        again. Once the file is there, the folder cannot be removed.
+        """
         for _ in range(_ATTEMPTS):
             try:
-                folder.mkdir(parents=True, exist_ok=True)
-            except FileNotFoundError:  # a deleter pruned a parent between two steps of mkdir
+                partial.parent.mkdir(parents=True, exist_ok=True)
+                return partial.open("xb")
+            except FileNotFoundError:
                 continue
-            return
+            except FileExistsError:
+                if any(folder.is_file() for folder in partial.parents):
+                    raise
         raise StorageError(
-            f"the folder {folder} keeps vanishing while an object is written to it; is another program deleting it?"
+            f"the folder {partial.parent} keeps vanishing while an object is written to it; who else deletes there?"
         )
 
     def _prune(self, folder: Path) -> None:
