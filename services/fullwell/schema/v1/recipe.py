@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
@@ -46,6 +46,12 @@ _RecipeName = Annotated[
     TextPattern(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,127}", "1 to 128 letters, digits, blanks or ._-, the first a letter or digit"),
 ]
 _Digest = Annotated[str, TextPattern(r"[0-9a-f]{64}", "a SHA-256 in 64 lower-case hexadecimal digits")]
+
+
+def _with_lists(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _with_lists(item) for key, item in value.items()}
+    return [_with_lists(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 class SpectralDocument(Document):
@@ -214,9 +220,10 @@ class RecipeDocument(Document):
         """Return the number of frames that the recipe makes."""
         return 1 if self.vary is None else self.vary.frame_count()
 
-    def plain(self) -> dict[str, object]:
-        """Return the recipe as plain data with all defaults filled in."""
-        return self.model_dump(mode="python", by_alias=True, exclude_none=True)
+    def plain(self) -> dict[str, Any]:
+        """Return the recipe as plain data (mappings, lists, numbers, text) with all defaults filled in."""
+        dumped: dict[str, Any] = _with_lists(self.model_dump(mode="python", by_alias=True, exclude_none=True))
+        return dumped
 
     def canonical_json(self) -> str:
         """Return the recipe as canonical JSON text: equal for equal recipes, and itself a legal recipe."""

@@ -1,0 +1,152 @@
+"""A recipe's frames as FrameDescriptions, and the check of a whole recipe."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fullwell.core.hashing import canonical_json
+from fullwell.schema.errors import RecipeError
+from fullwell.schema.loading import document_of
+from fullwell.schema.paths import with_values
+from fullwell.schema.v1.recipe import RecipeDocument
+from fullwell.schema.variation import extreme_values, frame_values
+
+if TYPE_CHECKING:
+    from fullwell.schema.conversion.context import AssetReader, RecipeFiles
+    from fullwell.schema.conversion.scenes import PlacedScene
+    from fullwell.schema.frame import CameraRig, FrameDescription
+
+__all__ = ["RecipeBuilder", "build_frame", "frame_document", "validate"]
+
+_BUILT_VALUES = 200
+"""Varied values that `validate` builds completely; the others are read and checked against the document's ranges."""
+_READ_VALUES = 5000
+
+
+def build_frame(
+    document: RecipeDocument, index: int = 0, *, base_dir: Path | None = None, asset_reader: AssetReader | None = None
+) -> FrameDescription:
+    """Return frame `index` of a recipe, resolved and checked.
+
+    `base_dir` is the folder of its files (default: that of the recipe's file), `asset_reader` finds "asset:" references.
+    For many frames of one recipe make one `RecipeBuilder`, which keeps the models it read. Raises RecipeError.
+    """
+    return RecipeBuilder(document, base_dir=base_dir, asset_reader=asset_reader).frame(index)
+
+
+def validate(
+    document: RecipeDocument, *, base_dir: Path | None = None, asset_reader: AssetReader | None = None
+) -> tuple[str, ...]:
+    """Return the warnings of a recipe after building its first frame and checking every value that `vary` can set.
+
+    Nothing is rendered. Raises RecipeError for the first thing that is wrong.
+    """
+    return RecipeBuilder(document, base_dir=base_dir, asset_reader=asset_reader).validate()
+
+
+def frame_document(document: RecipeDocument, index: int) -> RecipeDocument:
+    """Return the recipe of one frame, with `vary` applied and removed."""
+    return _varied_document(document, frame_values(document, index))
+
+
+def _varied_document(document: RecipeDocument, values: dict[str, Any]) -> RecipeDocument:
+    plain = document.plain()
+    plain.pop("vary", None)
+    return document_of(with_values(plain, values), base_dir=document.base_dir) if values else _without_vary(document)
+
+
+def _without_vary(document: RecipeDocument) -> RecipeDocument:
+    return document if document.vary is None else document.model_copy(update={"vary": None})
+
+
+class RecipeBuilder:
+    """Builds the frames of one recipe; model files and digests are kept between frames."""
+
+    def __init__(
+        self, document: RecipeDocument, *, base_dir: Path | None = None, asset_reader: AssetReader | None = None
+    ) -> None:
+        self._document = document
+        self._base_dir = document.base_dir if base_dir is None else base_dir
+        self._asset_reader = asset_reader
+        self._files: RecipeFiles | None = None
+
+    def frame(self, index: int) -> FrameDescription:
+        """Return frame `index`, resolved and checked. Raises RecipeError, or FieldError where there is no such frame."""
+        values = frame_values(self._document, index)
+        return self._build(_varied_document(self._document, values), values, index)
+
+    def validate(self) -> tuple[str, ...]:
+        """See the function `validate`."""
+        first = self.frame(0)
+        vary = self._document.vary
+        if vary is None:
+            return first.warnings
+        values = frame_values(self._document, 0)
+        for number, (where, path, value) in enumerate(extreme_values(vary)):
+            if number >= _READ_VALUES:
+                break
+            try:
+                changed = _varied_document(self._document, {**values, path: value})
+                if number < _BUILT_VALUES:
+                    self._build(changed, values, 0)
+            except RecipeError as error:
+                message = f"{error.message} ({where} sets {path}.)"
+                raise RecipeError(message, error.path, error.value) from error
+        return first.warnings
+
+    def _build(self, recipe: RecipeDocument, values: dict[str, Any], index: int) -> FrameDescription:
+        # Imported late: a recipe that is refused needs neither arrays nor tables.
+        from fullwell.radiometry.grid import WavelengthGrid  # noqa: PLC0415
+        from fullwell.schema.conversion.cameras import camera_rig  # noqa: PLC0415
+        from fullwell.schema.conversion.context import Context, RecipeFiles  # noqa: PLC0415
+        from fullwell.schema.conversion.scenes import scene_of  # noqa: PLC0415
+        from fullwell.schema.frame import FrameDescription, Quality  # noqa: PLC0415
+
+        if self._files is None:
+            self._files = RecipeFiles(self._base_dir, self._asset_reader, self._document.files)
+        grid = WavelengthGrid(recipe.spectral.first_nm, recipe.spectral.last_nm, recipe.spectral.step_nm)
+        context = Context(grid, self._files)
+        cameras = tuple(
+            camera_rig(camera, f"cameras[{i}]", recipe.quality.oversampling, context) for i, camera in enumerate(recipe.cameras)
+        )
+        placed = scene_of(recipe.scene, context)
+        _check_cameras_outside(cameras, placed)
+        plain = recipe.plain() | {"files": dict(sorted(context.used_files.items()))}
+        return FrameDescription(
+            recipe_name=recipe.name,
+            seed=recipe.seed,
+            index=index,
+            count=self._document.frame_count(),
+            varied=tuple((path, _scalar(value)) for path, value in values.items()),
+            scene=placed.description,
+            cameras=cameras,
+            grid=grid,
+            outputs=tuple(recipe.outputs),
+            quality=Quality(recipe.quality.samples_per_pixel, recipe.quality.max_depth),
+            warnings=tuple(context.warnings),
+            recipe_json=canonical_json(plain).decode(),
+        )
+
+
+def _scalar(value: Any) -> str | int | float | bool:
+    if isinstance(value, str | int | float | bool):
+        return value
+    return json.dumps(value, sort_keys=True, separators=(",", ":"))
+
+
+def _check_cameras_outside(cameras: tuple[CameraRig, ...], placed: PlacedScene) -> None:
+    from fullwell.schema.conversion.context import fail  # noqa: PLC0415
+    from fullwell.schema.conversion.inside import is_inside_opaque  # noqa: PLC0415
+
+    for index, rig in enumerate(cameras):
+        origin = rig.camera.camera_to_world[:3, 3]
+        for item, path, inside_ok in zip(placed.description.objects, placed.paths, placed.inside_ok, strict=True):
+            if not inside_ok and any(is_inside_opaque(part, item.to_world, origin) for part in item.parts):
+                fail(
+                    f"cameras[{index}].pose",
+                    f"puts the camera at {origin.tolist()}, inside the opaque object {item.id!r} ({path}), where it sees "
+                    f"nothing. Move the camera, or set {path}.inside_ok: true if the object is a room.",
+                    item.id,
+                )

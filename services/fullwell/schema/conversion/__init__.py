@@ -1,0 +1,1 @@
+"""Documents to dataclasses: the one place where units, names and files of a recipe are resolved."""

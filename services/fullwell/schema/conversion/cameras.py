@@ -1,0 +1,131 @@
+"""Cameras of a recipe: pose, lens, film and sensors."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fullwell.core.errors import FieldError
+from fullwell.isp.parameters import IspSettings
+from fullwell.scene import Camera, Film, Lens
+from fullwell.scene.camera import look_at
+from fullwell.schema.conversion.context import Context, fail, located
+from fullwell.schema.conversion.spectra import reflectance_of, spd_of
+from fullwell.schema.errors import RecipeError
+from fullwell.schema.frame import CameraRig, SensorRig
+from fullwell.schema.v1.cameras import CameraDocument, ExposureDocument, LensDocument, PoseDocument, SensorDocument
+from fullwell.sensor.parameters import AutoExposure, Exposure, FixedExposure, SensorModel
+
+__all__ = ["MAX_FILM_BYTES", "MAX_FILM_SAMPLES", "camera_rig"]
+
+MAX_FILM_SAMPLES = 64_000_000
+MAX_FILM_BYTES = 8 * 2**30
+_RIGID_TOLERANCE = 1e-6
+
+
+def camera_rig(document: CameraDocument, path: str, oversampling: int, context: Context) -> CameraRig:
+    """Return the camera and the sensors behind its lens; raises RecipeError where they are too large to render."""
+    pose = _pose(document.pose, f"{path}.pose")
+    models = [_sensor_model(sensor, f"{path}.sensors[{i}]") for i, sensor in enumerate(document.sensors)]
+    film = _film(models, path, oversampling, context)
+    lens = _lens(document, f"{path}.lens", models[0], context)
+    sensors = [
+        SensorRig(sensor.name, model, _exposure(sensor.exposure), _isp(sensor, f"{path}.sensors[{i}].isp", context))
+        for i, (sensor, model) in enumerate(zip(document.sensors, models, strict=True))
+    ]
+    return CameraRig(Camera(document.name, pose, lens, film), tuple(sensors))
+
+
+def _pose(document: PoseDocument, path: str) -> NDArray[np.float64]:
+    if document.matrix is not None:
+        return _rigid(np.array(document.matrix, dtype=np.float64), f"{path}.matrix")
+    up = document.up or (0.0, 0.0, 1.0)
+    try:
+        return look_at(np.array(document.origin_m), np.array(document.target_m), np.array(up))
+    except FieldError as error:
+        names = {"target": "target_m"}
+        raise RecipeError(f"{path}: {error.message}", f"{path}.{names.get(error.path, error.path)}", error.value) from error
+
+
+def _rigid(matrix: NDArray[np.float64], path: str) -> NDArray[np.float64]:
+    rotation = matrix[:3, :3]
+    if not np.allclose(rotation.T @ rotation, np.eye(3), atol=_RIGID_TOLERANCE) or np.linalg.det(rotation) < 0:
+        fail(
+            path,
+            "is not a rotation and a translation; its first three columns must be perpendicular unit vectors, right-handed.",
+        )
+    if not np.array_equal(matrix[3], [0, 0, 0, 1]):
+        fail(path, f"has the last row {matrix[3].tolist()}; must be [0, 0, 0, 1].")
+    return matrix
+
+
+def _sensor_model(document: SensorDocument, path: str) -> SensorModel:
+    from fullwell.sensor.catalogue import sensor  # noqa: PLC0415 - the catalogue reads tables
+
+    with located(f"{path}.model"):
+        model = sensor(document.model, path=f"{path}.model")
+    return dataclasses.replace(model, **document.overrides())  # type: ignore[arg-type]
+
+
+def _film(models: list[SensorModel], path: str, oversampling: int, context: Context) -> Film:
+    """The grid that covers the largest sensor at the finest pixel pitch / oversampling."""
+    pitch_m = min(model.pixel_pitch_m for model in models) / oversampling
+    height_m = max(model.rows * model.pixel_pitch_m for model in models)
+    width_m = max(model.cols * model.pixel_pitch_m for model in models)
+    rows, cols = (math.ceil(side_m / pitch_m - 1e-6) for side_m in (height_m, width_m))
+    samples, bands = rows * cols, context.grid.count
+    what = f"{rows} x {cols} = {samples:.4g} samples (the largest sensor at the finest pixel pitch"
+    what += f", oversampling {oversampling})" if oversampling > 1 else ")"
+    if samples > MAX_FILM_SAMPLES:
+        fail(f"{path}.sensors", f"need a film of {what}; must be <= {MAX_FILM_SAMPLES:.4g}. Lower rows and cols.", samples)
+    if samples * bands * 4 > MAX_FILM_BYTES:
+        gib = samples * bands * 4 / 2**30
+        fail(
+            f"{path}.sensors",
+            f"need {gib:.3g} GiB of radiance: {what} times {bands} bands; must be <= {MAX_FILM_BYTES / 2**30:g} GiB. Lower "
+            "rows and cols, or widen spectral.step_nm.",
+            samples * bands * 4,
+        )
+    return Film(rows, cols, pitch_m)
+
+
+def _lens(document: CameraDocument, path: str, model: SensorModel, context: Context) -> Lens:
+    lens = document.lens
+    focus_distance_m = _focus_distance_m(lens, document.pose)
+    if lens.focal_length_m is not None:
+        focal_length_m = lens.focal_length_m
+        if not focus_distance_m > focal_length_m:
+            sentence = (
+                f"is {focus_distance_m:g} m away, not beyond the focal length {focal_length_m:g} m; set lens.focus_distance_m."
+            )
+            fail(f"{path}.focus_distance_m", sentence, focus_distance_m)
+    else:
+        half = math.radians(float(lens.hfov_deg or 0.0)) / 2
+        image_distance_m = model.cols * model.pixel_pitch_m / (2 * math.tan(half))
+        focal_length_m = 1.0 / (1.0 / image_distance_m + 1.0 / focus_distance_m)
+    transmittance = reflectance_of(lens.transmittance, f"{path}.transmittance", context)
+    return Lens(lens.kind, focal_length_m, lens.f_number, focus_distance_m, transmittance, lens.diffraction)
+
+
+def _focus_distance_m(lens: LensDocument, pose: PoseDocument) -> float:
+    if lens.focus_distance_m is not None:
+        return lens.focus_distance_m
+    if lens.kind == "pinhole" or pose.origin_m is None or pose.target_m is None:
+        return math.inf
+    return math.dist(pose.origin_m, pose.target_m)
+
+
+def _exposure(document: ExposureDocument) -> Exposure:
+    if document.auto is None:
+        return FixedExposure(float(document.time_s or 0.0))
+    auto = document.auto
+    return AutoExposure(auto.method, auto.level, auto.percentile, auto.min_time_s, auto.max_time_s)
+
+
+def _isp(document: SensorDocument, path: str, context: Context) -> IspSettings:
+    quiet = dataclasses.replace(context, warnings=[])  # that an illuminant's table ends changes no radiance here
+    illuminant = spd_of(document.isp.illuminant, f"{path}.illuminant", quiet)
+    return IspSettings(illuminant, document.isp.white_balance, document.isp.demosaic)

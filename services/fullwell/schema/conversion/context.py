@@ -1,0 +1,126 @@
+"""What a conversion carries along: files, warnings, the wavelength grid; and how errors get their path."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from fullwell.core.errors import FieldError, FullwellError, nearest_names
+from fullwell.core.hashing import sha256_file
+from fullwell.radiometry.grid import WavelengthGrid
+from fullwell.radiometry.spectrum import Spectrum
+from fullwell.scene.description import Emission, Material
+from fullwell.schema.errors import RecipeError
+
+if TYPE_CHECKING:
+    from fullwell.assets.model import LoadedModel
+
+__all__ = ["AssetReader", "Context", "RecipeFiles", "fail", "located"]
+
+AssetReader = Callable[[str], Path]
+"""Turns the reference behind "asset:" into a local file; raises a FullwellError where it cannot."""
+
+ASSET_PREFIX = "asset:"
+PACKAGED_PREFIX = "sumo:"
+_KEPT_MODELS = 64
+"""Models kept between the frames of one recipe; more are read again, so that memory does not grow without bound."""
+
+
+def fail(path: str, sentence: str, value: Any = None) -> NoReturn:
+    """Raise the RecipeError that reads "<path> <sentence>"."""
+    raise RecipeError(f"{path} {sentence}", path, value)
+
+
+@contextmanager
+def located(path: str) -> Iterator[None]:
+    """Give errors that other parts raise the path of the recipe's field."""
+    try:
+        yield
+    except RecipeError:
+        raise
+    except FieldError as error:
+        message = error.message if error.message.startswith(path) else f"{path}: {error.message}"
+        raise RecipeError(message, error.path if error.path.startswith(path) else path, error.value) from error
+    except FullwellError as error:
+        raise RecipeError(f"{path}: {error.message}", path) from error
+
+
+class RecipeFiles:
+    """Files that a recipe names: found, hashed once, and models kept for the next frame."""
+
+    def __init__(self, base_dir: Path | None, asset_reader: AssetReader | None, expected: dict[str, str]) -> None:
+        self._base_dir = base_dir
+        self._asset_reader = asset_reader
+        self._expected = expected
+        self._digests: dict[tuple[str, int, int], str] = {}
+        self._models: dict[tuple[str, str, float | None, str | None], LoadedModel] = {}
+
+    def find(self, reference: str, path: str) -> tuple[Path, str]:
+        """Return the local file of a reference and its SHA-256. Raises RecipeError for `path`."""
+        with located(path):
+            file = self._local(reference, path)
+        if not file.is_file():
+            siblings = [entry.name for entry in file.parent.iterdir()] if file.parent.is_dir() else []
+            close = nearest_names(file.name, siblings)
+            advice = f"did you mean {' or '.join(close)}?" if close else "file names are relative to the recipe's folder."
+            fail(path, f"is {reference!r}, which {'is a folder' if file.is_dir() else 'does not exist'}; {advice}", reference)
+        return file, self._digest(file, reference, path)
+
+    def _local(self, reference: str, path: str) -> Path:
+        if reference.startswith(ASSET_PREFIX):
+            if self._asset_reader is None:
+                fail(path, f"is {reference!r}, but no asset store is at hand here; give a file.", reference)
+            return self._asset_reader(reference.removeprefix(ASSET_PREFIX))
+        if reference.startswith(PACKAGED_PREFIX):
+            from fullwell.assets import packaged_model  # noqa: PLC0415 - an extra
+
+            return packaged_model(reference, field_path=path).path
+        if self._base_dir is None:
+            fail(path, f"is {reference!r}, but this recipe has no folder; load it from a file, or use an asset.", reference)
+        return self._base_dir / reference
+
+    def _digest(self, file: Path, reference: str, path: str) -> str:
+        status = file.stat()
+        key = (str(file), status.st_size, status.st_mtime_ns)
+        if key not in self._digests:
+            try:
+                self._digests[key] = sha256_file(file)
+            except OSError as error:
+                fail(path, f"is {reference!r}, which cannot be read: {error.strerror}.", reference)
+        digest, expected = self._digests[key], self._expected.get(reference, "")
+        if expected and digest != expected:
+            fail(path, f"is {reference!r}, whose SHA-256 is {digest}; files says {expected}. It was changed.", reference)
+        return digest
+
+    def model(self, file: Path, digest: str, *, unit_m: float | None, up_axis: str | None, path: str) -> LoadedModel:
+        """Return a model file's content, read once per digest and reading options."""
+        from fullwell.assets.meshes import load_model  # noqa: PLC0415 - reading models is an extra
+
+        key = (digest, file.suffix.lower(), unit_m, up_axis)
+        if key not in self._models:
+            if len(self._models) >= _KEPT_MODELS:
+                self._models.pop(next(iter(self._models)))
+            with located(path):
+                self._models[key] = load_model(file, unit_m=unit_m, up_axis=up_axis, field_path=path)  # type: ignore[arg-type]
+        return self._models[key]
+
+
+@dataclass(slots=True)
+class Context:
+    """State of the conversion of one frame."""
+
+    grid: WavelengthGrid
+    files: RecipeFiles
+    warnings: list[str] = field(default_factory=list)
+    used_files: dict[str, str] = field(default_factory=dict)
+    materials: dict[str, tuple[Material, Emission | None]] = field(default_factory=dict)
+    """By their canonical text: equal materials become one, which lets the renderer share them."""
+    upsampled: dict[tuple[float, float, float], Spectrum] = field(default_factory=dict)
+
+    def warn(self, sentence: str) -> None:
+        """Note a sentence for the manifest, once."""
+        if sentence not in self.warnings:
+            self.warnings.append(sentence)

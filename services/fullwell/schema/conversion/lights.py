@@ -1,0 +1,166 @@
+"""Lights of a recipe to absolute spectra."""
+
+from __future__ import annotations
+
+import math
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+
+from fullwell.radiometry import Spectrum
+from fullwell.scene import (
+    ConstantEnvironment,
+    Diffuse,
+    DirectionalLight,
+    ImageEnvironment,
+    Light,
+    Part,
+    PointLight,
+    SceneObject,
+    SpotLight,
+    SunSky,
+)
+from fullwell.schema.conversion.context import Context, fail, located
+from fullwell.schema.conversion.geometry import geometry_of, surface_area_m2, transform_of
+from fullwell.schema.conversion.materials import RADIANCE_UNIT, emission_of
+from fullwell.schema.conversion.pictures import read_linear_rgb
+from fullwell.schema.conversion.solar import sun_angles_deg
+from fullwell.schema.conversion.spectra import absolute, luminous
+from fullwell.schema.v1 import lights as documents
+
+__all__ = ["area_light_object", "light_of", "spot_solid_angle_sr"]
+
+_INTENSITY_UNIT = "W sr^-1 nm^-1"
+_IRRADIANCE_UNIT = "W m^-2 nm^-1"
+_SKY_MODEL_ENDS_NM = 720.0
+_BLACK = Diffuse(Spectrum.constant(0.0))
+
+
+def area_light_object(document: documents.AreaLight, path: str, context: Context) -> SceneObject:
+    """Return the black emitting object that an area light is; its id is the light's name."""
+    geometry = geometry_of(document.geometry, f"{path}.geometry")
+    to_world = transform_of(document.transform, f"{path}.transform")
+    emission = emission_of(document, path, context, area_m2=surface_area_m2(geometry, to_world))
+    part = Part(geometry, _BLACK, emission=emission)
+    return SceneObject(document.name, document.semantic_class, (part,), to_world)
+
+
+def light_of(document: Any, path: str, context: Context) -> Light:
+    """Return any light but an area light."""
+    match document:
+        case documents.PointLightDocument():
+            intensity = _intensity(document, path, context, solid_angle_sr=4 * math.pi)
+            return PointLight(document.position_m, intensity, document.group)
+        case documents.SpotLightDocument():
+            return _spot(document, path, context)
+        case documents.DirectionalLightDocument():
+            if document.irradiance_w_m2_nm is not None:
+                irradiance = absolute(document.irradiance_w_m2_nm, f"{path}.irradiance_w_m2_nm", _IRRADIANCE_UNIT, context)
+            else:
+                irradiance = luminous(document, "illuminance_lux", path, _IRRADIANCE_UNIT, context)
+            return DirectionalLight(_unit(document.direction), irradiance, document.group)
+        case documents.ConstantEnvironmentLight():
+            return ConstantEnvironment(_sky_radiance(document, path, context), document.group)
+        case documents.ImageEnvironmentLight():
+            return _image(document, path, context)
+        case documents.SunSkyLight():
+            return _sun_sky(document, path, context)
+        case _:
+            raise TypeError(f"{type(document).__name__} is not a light")
+
+
+def _unit(direction: tuple[float, float, float]) -> tuple[float, float, float]:
+    vector = np.array(direction, dtype=np.float64)
+    vector /= np.abs(vector).max()
+    x, y, z = (vector / np.linalg.norm(vector)).tolist()
+    return x, y, z
+
+
+def _intensity(document: Any, path: str, context: Context, *, solid_angle_sr: float) -> Spectrum:
+    if document.intensity_w_sr_nm is not None:
+        return absolute(document.intensity_w_sr_nm, f"{path}.intensity_w_sr_nm", _INTENSITY_UNIT, context)
+    if document.luminous_intensity_cd is not None:
+        return luminous(document, "luminous_intensity_cd", path, _INTENSITY_UNIT, context)
+    return luminous(document, "luminous_flux_lm", path, _INTENSITY_UNIT, context, per=solid_angle_sr)
+
+
+def spot_solid_angle_sr(beam_deg: float, cutoff_deg: float) -> float:
+    """Return flux / axial intensity [sr] of a spot: full within `beam_deg`, linear in angle to 0 at `cutoff_deg`.
+
+    2 pi times the integral of falloff(t) sin t dt from 0 to the cutoff c: 1 - (sin c - sin b) / (c - b).
+    """
+    beam, cutoff = math.radians(beam_deg), math.radians(cutoff_deg)
+    return 2 * math.pi * (1 - (math.sin(cutoff) - math.sin(beam)) / (cutoff - beam))
+
+
+def _spot(document: documents.SpotLightDocument, path: str, context: Context) -> SpotLight:
+    if document.direction is not None:
+        direction = _unit(document.direction)
+    else:
+        target = document.target_m or document.position_m
+        x, y, z = (b - a for a, b in zip(document.position_m, target, strict=True))
+        direction = _unit((x, y, z))
+    solid_angle_sr = spot_solid_angle_sr(document.beam_deg, document.cutoff_deg)
+    intensity = _intensity(document, path, context, solid_angle_sr=solid_angle_sr)
+    return SpotLight(document.position_m, direction, intensity, document.beam_deg, document.cutoff_deg, document.group)
+
+
+def _sky_radiance(document: Any, path: str, context: Context) -> Spectrum:
+    """A uniform sky of radiance L gives an unshaded plane the irradiance pi L."""
+    if document.radiance_w_sr_m2_nm is not None:
+        return absolute(document.radiance_w_sr_m2_nm, f"{path}.radiance_w_sr_m2_nm", RADIANCE_UNIT, context)
+    if document.luminance_cd_m2 is not None:
+        return luminous(document, "luminance_cd_m2", path, RADIANCE_UNIT, context)
+    return luminous(document, "illuminance_lux", path, RADIANCE_UNIT, context, per=math.pi)
+
+
+def _image(document: documents.ImageEnvironmentLight, path: str, context: Context) -> ImageEnvironment:
+    file, digest = context.files.find(document.file, f"{path}.file")
+    context.used_files[document.file] = digest
+    with located(f"{path}.file"):
+        pixels = read_linear_rgb(file)
+    context.warn(f"{path}.file: the colours of a picture are RGB; their spectra are made up.")
+    return ImageEnvironment(pixels, _sky_radiance(document, path, context), document.azimuth_deg, document.group)
+
+
+def _sun_sky(document: documents.SunSkyLight, path: str, context: Context) -> SunSky:
+    last_nm = float(context.grid.edges_nm[-1])
+    if last_nm > _SKY_MODEL_ENDS_NM:
+        longest_nm = _SKY_MODEL_ENDS_NM - context.grid.step_nm / 2
+        fail(
+            "spectral.last_nm",
+            f"is {context.grid.last_nm:g}, but {path} is a sun_sky, whose model ends at {_SKY_MODEL_ENDS_NM:g} nm; with "
+            f"step_nm = {context.grid.step_nm:g} it must be <= {longest_nm:g}. Shorten the grid, or use another light.",
+            context.grid.last_nm,
+        )
+    elevation_deg, azimuth_deg = _sun_angles(document, path)
+    elevation, azimuth = math.radians(elevation_deg), math.radians(azimuth_deg)
+    sun = (math.cos(elevation) * math.sin(azimuth), math.cos(elevation) * math.cos(azimuth), math.sin(elevation))
+    return SunSky(
+        _unit(sun),
+        document.turbidity,
+        document.ground_albedo,
+        document.sun_weight,
+        document.sky_weight,
+        group=document.group,
+    )
+
+
+def _sun_angles(document: documents.SunSkyLight, path: str) -> tuple[float, float]:
+    if document.sun_elevation_deg is not None and document.sun_azimuth_deg is not None:
+        return document.sun_elevation_deg, document.sun_azimuth_deg
+    text = str(document.time_utc)
+    try:
+        time = datetime.fromisoformat(text)
+    except ValueError:
+        fail(f"{path}.time_utc", f"is {text!r}; must be a time such as 2024-06-21T10:30:00Z.", text)
+    time = time.replace(tzinfo=UTC) if time.tzinfo is None else time
+    elevation_deg, azimuth_deg = sun_angles_deg(
+        time, latitude_deg=document.latitude_deg or 0.0, longitude_deg=document.longitude_deg or 0.0
+    )
+    if elevation_deg <= 0:
+        fail(
+            f"{path}.time_utc", f"is {text!r}, when the sun is {-elevation_deg:.1f} deg below the horizon; take another.", text
+        )
+    return elevation_deg, azimuth_deg

@@ -1,0 +1,157 @@
+"""Objects and lights of a recipe to a SceneDescription."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fullwell.core.errors import unknown_name_message
+from fullwell.scene import (
+    ConstantEnvironment,
+    Emission,
+    ImageEnvironment,
+    Light,
+    Material,
+    Mesh,
+    Part,
+    SceneDescription,
+    SceneObject,
+    SunSky,
+)
+from fullwell.schema.conversion.context import Context, fail
+from fullwell.schema.conversion.geometry import geometry_of, transform_of
+from fullwell.schema.conversion.lights import area_light_object, light_of
+from fullwell.schema.conversion.materials import material_of, model_material
+from fullwell.schema.v1.geometry import ModelGeometry
+from fullwell.schema.v1.lights import AreaLight
+from fullwell.schema.v1.recipe import ObjectDocument, PartDocument, SceneDocument
+
+if TYPE_CHECKING:
+    from fullwell.assets.model import LoadedPart
+
+__all__ = ["PlacedScene", "scene_of"]
+
+_ENVIRONMENTS = (ConstantEnvironment, ImageEnvironment, SunSky)
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedScene:
+    """A scene and, for messages, the path of each object and whether a camera may be inside it."""
+
+    description: SceneDescription
+    paths: tuple[str, ...]
+    inside_ok: tuple[bool, ...]
+
+
+def scene_of(document: SceneDocument, context: Context) -> PlacedScene:
+    """Return the scene; raises RecipeError for the first thing in it that cannot be rendered."""
+    _check_not_empty(document)
+    objects, paths, inside_ok = [], [], []
+    for index, item in enumerate(document.objects):
+        path = f"scene.objects[{index}]"
+        objects.append(_object(item, document.materials, path, context))
+        paths.append(path)
+        inside_ok.append(item.inside_ok)
+    lights: list[Light] = []
+    environment = ""
+    for index, light in enumerate(document.lights):
+        path = f"scene.lights[{index}]"
+        if isinstance(light, AreaLight):
+            objects.append(area_light_object(light, path, context))
+            paths.append(path)
+            inside_ok.append(True)
+            continue
+        lights.append(light_of(light, path, context))
+        if isinstance(lights[-1], _ENVIRONMENTS):
+            if environment:
+                fail(path, f"is an environment, as is {environment}; a scene can have one. Remove one of them.")
+            environment = path
+    if not lights and not any(part.emission for item in objects for part in item.parts):
+        fail("scene.lights", "is empty and no object emits: nothing would be lit. Add a light.")
+    classes = document.classes or sorted({item.semantic_class for item in objects} - {""})
+    return PlacedScene(SceneDescription(tuple(objects), tuple(lights), tuple(classes)), tuple(paths), tuple(inside_ok))
+
+
+def _check_not_empty(document: SceneDocument) -> None:
+    environments = ("constant_environment", "image_environment", "sun_sky", "area")
+    if not document.objects and not any(light.kind in environments for light in document.lights):
+        fail("scene.objects", "is empty and there is no environment light: nothing can be seen. Add an object or a sky.")
+
+
+@dataclass(frozen=True, slots=True)
+class _Surface:
+    """A geometry of the recipe with what it says about materials, and where it stands."""
+
+    geometry: Any
+    material: Any
+    materials: Mapping[str, Any]
+    to_object: NDArray[np.float64]
+    name: str
+    path: str
+
+
+def _object(document: ObjectDocument, named: Mapping[str, Any], path: str, context: Context) -> SceneObject:
+    if document.parts is None:
+        surfaces = [_Surface(document.geometry, document.material, document.materials, np.eye(4), "", path)]
+    else:
+        surfaces = [_surface_of(item, f"{path}.parts[{number}]") for number, item in enumerate(document.parts)]
+    parts = tuple(part for surface in surfaces for part in _parts(surface, named, context))
+    to_world = transform_of(document.transform, f"{path}.transform")
+    return SceneObject(document.id, document.semantic_class, parts, to_world, tuple(document.licences))
+
+
+def _surface_of(document: PartDocument, path: str) -> _Surface:
+    to_object = transform_of(document.transform, f"{path}.transform")
+    return _Surface(document.geometry, document.material, document.materials, to_object, document.name or "", path)
+
+
+def _parts(surface: _Surface, named: Mapping[str, Any], context: Context) -> list[Part]:
+    if isinstance(surface.geometry, ModelGeometry):
+        return _model_parts(surface, surface.geometry, named, context)
+    if surface.materials:
+        fail(f"{surface.path}.materials", "is for model files only; give material.")
+    geometry = geometry_of(surface.geometry, f"{surface.path}.geometry")
+    if surface.material is None:
+        fail(f"{surface.path}.material", "is missing; name an entry of scene.materials or write one in place.")
+    material, emission = material_of(surface.material, named, f"{surface.path}.material", context)
+    return [Part(geometry, material, surface.to_object, emission, surface.name)]
+
+
+def _model_parts(surface: _Surface, geometry: ModelGeometry, named: Mapping[str, Any], context: Context) -> list[Part]:
+    file_path = f"{surface.path}.geometry.file"
+    file, digest = context.files.find(geometry.file, file_path)
+    context.used_files[geometry.file] = digest
+    model = context.files.model(file, digest, unit_m=geometry.unit_m, up_axis=geometry.up_axis, path=file_path)
+    for warning in model.warnings:
+        context.warn(f"{file_path}: {warning}")
+    _check_patterns(surface, [part.name for part in model.parts])
+    prefix = f"{surface.name}/" if surface.name else ""
+    parts = []
+    for loaded in model.parts:
+        mesh = Mesh(loaded.vertices_m, loaded.faces, loaded.normals, loaded.uv)
+        material, emission = _loaded_material(surface, loaded, named, context)
+        parts.append(Part(mesh, material, surface.to_object, emission, prefix + loaded.name))
+    return parts
+
+
+def _check_patterns(surface: _Surface, names: list[str]) -> None:
+    for pattern in surface.materials:
+        if not any(fnmatchcase(name, pattern) for name in names):
+            message = unknown_name_message("part", pattern, names)
+            fail(f'{surface.path}.materials."{pattern}"', f"matches no part of the model: {message}", pattern)
+
+
+def _loaded_material(
+    surface: _Surface, loaded: LoadedPart, named: Mapping[str, Any], context: Context
+) -> tuple[Material, Emission | None]:
+    for pattern, reference in surface.materials.items():
+        if fnmatchcase(loaded.name, pattern):
+            return material_of(reference, named, f'{surface.path}.materials."{pattern}"', context)
+    if surface.material is not None:
+        return material_of(surface.material, named, f"{surface.path}.material", context)
+    return model_material(loaded, f"{surface.path}.geometry.file", context), None
