@@ -112,10 +112,15 @@ def _encode_spectral(
     *,
     unit: str,
 ) -> bytes:
-    energy = photons_to_energy(photons, grid.centres_nm).astype(np.float32)
-    if not (np.all(np.isfinite(energy)) and np.all(energy >= 0)):
-        raise FieldError(f"the {metadata['quantity']} holds NaN, Inf or negative values; every value must be >= 0 and finite.")
-    channels = {_channel_name(nm): np.ascontiguousarray(energy[..., k]) for k, nm in enumerate(grid.centres_nm)}
+    channels: dict[str, NDArray[np.float32]] = {}
+    # Band by band: the float64 copy of a whole image would be twice as large as the image.
+    for k, wavelength_nm in enumerate(grid.centres_nm):
+        energy = photons_to_energy(photons[..., k], wavelength_nm).astype(np.float32)
+        if not (np.all(np.isfinite(energy)) and np.all(energy >= 0)):
+            raise FieldError(
+                f"the {metadata['quantity']} holds NaN, Inf or negative values at {wavelength_nm:g} nm; must be >= 0."
+            )
+        channels[_channel_name(wavelength_nm)] = energy
     attributes = {"spectralLayoutVersion": "1.0", "emissiveUnits": unit}
     return _encode_exr({**channels, **extra}, {**attributes, _METADATA: _compact_json(metadata)})
 
