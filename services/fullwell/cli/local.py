@@ -1,11 +1,229 @@
-"""Commands of this part."""
+"""Commands that work in this process: render, plan, validate, show."""
 
 from __future__ import annotations
 
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
 import typer
 
+from fullwell.core.errors import FieldError, NotFoundError
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+    from fullwell.schema import RecipeDocument
+
 __all__ = ["register"]
+
+RecipeArgument = Annotated[Path, typer.Argument(help="Recipe file, YAML or JSON.", metavar="RECIPE")]
+SetOption = Annotated[
+    list[str] | None, typer.Option("--set", help="Override one value: path=value, for example quality.samples_per_pixel=16.")
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Report as JSON.")]
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands of this module to `app`."""
+    app.command()(render)
+    app.command()(plan)
+    app.command()(validate)
+    app.command()(show)
+
+
+def render(
+    recipe: RecipeArgument,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for the frames; default out/<recipe name>.")
+    ] = None,
+    overrides: SetOption = None,
+    frames: Annotated[str | None, typer.Option(help="Frames to make: one number, or A-B with both ends included.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace frames that were made from another recipe.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Make the frames of a recipe on this machine, in this process."""
+    from fullwell.pipeline import run_frame  # noqa: PLC0415
+    from fullwell.storage import LocalStore  # noqa: PLC0415
+
+    document = _load(recipe, overrides)
+    wanted = _frame_range(frames, document.frame_count())
+    folder = output if output is not None else Path("out") / document.name
+    store = LocalStore(folder)
+    finished: list[dict[str, Any]] = []
+    with _progress(quiet=as_json) as bars:
+        total = bars.add_task(document.name, total=len(wanted))
+        for index in wanted:
+            bar = bars.add_task(f"frame {index}: load", total=1.0)
+            prefix = f"frames/{index}"
+            if force:
+                _forget_other(store, prefix, document, index)
+            manifest = run_frame(
+                document,
+                index,
+                store,
+                prefix,
+                base_dir=document.base_dir,
+                progress=lambda at, bar=bar, index=index: bars.update(  # type: ignore[misc]
+                    bar, completed=at.fraction, description=f"frame {index}: {at.stage}"
+                ),
+            )
+            bars.remove_task(bar)
+            bars.advance(total)
+            finished.append(_summary(folder / prefix, index, manifest))
+    if as_json:
+        print(json.dumps({"frames": finished}, indent=2))
+        return
+    for item in finished:
+        print(f"frame {item['index']}: {item['folder']} ({', '.join(item['products'])})")
+    for warning in sorted({warning for item in finished for warning in item["warnings"]}):
+        print(f"note: {warning}")
+
+
+def _summary(folder: Path, index: int, manifest: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "index": index,
+        "folder": str(folder),
+        "products": [product["name"] for product in manifest["products"]],
+        "warnings": manifest["warnings"],
+        "seconds": manifest["run"]["seconds"],
+    }
+
+
+def _forget_other(store: Any, prefix: str, document: RecipeDocument, index: int) -> None:
+    """Remove a published frame that was made from another recipe; the same frame is left alone and reused."""
+    from fullwell.dataset.encode import decode_json  # noqa: PLC0415
+    from fullwell.pipeline import MANIFEST_NAME  # noqa: PLC0415
+    from fullwell.pipeline.keys import frame_digest  # noqa: PLC0415
+    from fullwell.schema import build_frame  # noqa: PLC0415
+
+    key = f"{prefix}/{MANIFEST_NAME}"
+    if store.exists(key):
+        digest = frame_digest(build_frame(document, index, base_dir=document.base_dir))
+        if decode_json(store.get(key)).get("frame_digest") != digest:
+            store.delete(key)  # the commit point first: a crash in between leaves products that nobody reads
+            store.delete_prefix(f"{prefix}/")
+
+
+def plan(recipe: RecipeArgument, overrides: SetOption = None, frame: int = 0, as_json: JsonOption = False) -> None:
+    """Say what a frame would need, what is skipped and why; nothing is rendered."""
+    from fullwell.pipeline import plan_document, plan_frame  # noqa: PLC0415
+    from fullwell.schema import build_frame  # noqa: PLC0415
+
+    document = _load(recipe, overrides)
+    decided = plan_frame(build_frame(document, frame, base_dir=document.base_dir))
+    if as_json:
+        print(json.dumps({"frame": frame, "plan": plan_document(decided)}, indent=2))
+        return
+    from rich.console import Console  # noqa: PLC0415
+    from rich.table import Table  # noqa: PLC0415
+
+    table = Table("what", "decision", "why", "bound on the error", title=f"{document.name}, frame {frame}")
+    for step in decided.steps:
+        table.add_row(step.what, step.decision, step.why, step.error_bound)
+    Console().print(table)
+
+
+def validate(recipe: RecipeArgument, overrides: SetOption = None, as_json: JsonOption = False) -> None:
+    """Check a recipe and the files it names without rendering."""
+    from fullwell.schema import RecipeError  # noqa: PLC0415
+    from fullwell.schema import validate as validate_document  # noqa: PLC0415
+
+    try:
+        document = _load(recipe, overrides)
+        validate_document(document, base_dir=document.base_dir)
+    except RecipeError as error:
+        if not as_json:
+            raise
+        problems = [{"path": p.path, "message": p.message} for p in error.errors]
+        print(json.dumps({"valid": False, "errors": problems}, indent=2))
+        raise typer.Exit(1) from None
+    if as_json:
+        print(json.dumps({"valid": True, "frames": document.frame_count()}))
+    else:
+        count = document.frame_count()
+        print(f"{recipe} is valid: {count} frame{'s' if count != 1 else ''}.")
+
+
+def show(
+    frame_dir: Annotated[Path, typer.Argument(help="Folder of one frame, or of a whole render.", metavar="FRAME_DIR")],
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Picture to write; default FRAME_DIR/show.png.")] = None,
+) -> None:
+    """Make one picture of all products of a frame."""
+    from fullwell.dataset.contact import picture_of_products  # noqa: PLC0415
+
+    folder = _frame_folder(frame_dir)
+    products = {
+        file.relative_to(folder).as_posix(): file.read_bytes()
+        for file in sorted(folder.rglob("*"))
+        if file.is_file() and file.name != "show.png" and not file.name.startswith(".")
+    }
+    manifest = json.loads(products["manifest.json"])
+    target = output if output is not None else folder / "show.png"
+    from fullwell.core.files import atomic_write  # noqa: PLC0415
+
+    title = f"{manifest.get('recipe_name', folder.name)}, frame {manifest.get('index', 0)}"
+    atomic_write(target, picture_of_products(products, title))
+    print(target)
+
+
+def _frame_folder(given: Path) -> Path:
+    """Return the frame's folder; a render with one frame may be named by its top folder."""
+    if (given / "manifest.json").is_file():
+        return given
+    inside = sorted(given.glob("frames/*/manifest.json")) or sorted(given.glob("*/manifest.json"))
+    if len(inside) == 1:
+        return inside[0].parent
+    if inside:
+        raise FieldError(
+            f"{given} holds {len(inside)} frames; name one of them, for example {inside[0].parent}.", path="FRAME_DIR"
+        )
+    raise NotFoundError(f"{given} holds no finished frame (no manifest.json). Run `fullwell render` first.")
+
+
+def _load(recipe: Path, overrides: list[str] | None) -> RecipeDocument:
+    from fullwell.schema import load_recipe  # noqa: PLC0415
+
+    return load_recipe(recipe, overrides=parse_overrides(overrides))
+
+
+def parse_overrides(overrides: list[str] | None) -> dict[str, str]:
+    """Return {path: value} of ``path=value`` words. Raises FieldError for a word without an equals sign."""
+    pairs: dict[str, str] = {}
+    for word in overrides or []:
+        path, equals, value = word.partition("=")
+        if not equals or not path.strip():
+            raise FieldError(f"--set {word!r} is not path=value; write for example --set seed=7.", path="--set", value=word)
+        pairs[path.strip()] = value
+    return pairs
+
+
+def _frame_range(text: str | None, count: int) -> range:
+    """Return the frame numbers of "A" or "A-B". Raises FieldError outside 0 to count - 1."""
+    if text is None:
+        return range(count)
+    first_text, _, last_text = text.partition("-")
+    try:
+        first = int(first_text)
+        last = int(last_text) if last_text else first
+    except ValueError:
+        raise FieldError(f"--frames is {text!r}; must be a number or A-B, such as 0-7.", path="--frames", value=text) from None
+    if not 0 <= first <= last < count:
+        raise FieldError(f"--frames is {text!r}; this recipe has frames 0 to {count - 1}.", path="--frames", value=text)
+    return range(first, last + 1)
+
+
+def _progress(*, quiet: bool) -> Progress:
+    from rich.console import Console  # noqa: PLC0415
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn  # noqa: PLC0415
+
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f}%"),
+        TimeElapsedColumn(),
+        console=Console(file=sys.stderr),
+        disable=quiet,
+        transient=True,
+    )

@@ -1,0 +1,22 @@
+"""From a recipe to published frames: plan, stages, keys, cache, frame runner."""
+
+from fullwell.pipeline.cache import RadianceCache
+from fullwell.pipeline.frame import MANIFEST_NAME, MANIFEST_SCHEMA, render_frame
+from fullwell.pipeline.plan import FramePlan, PlanStep, plan_document, plan_frame
+from fullwell.pipeline.progress import CancelCheck, FrameProgress, ProgressCallback
+from fullwell.pipeline.run import run_frame
+
+__all__ = [
+    "MANIFEST_NAME",
+    "MANIFEST_SCHEMA",
+    "CancelCheck",
+    "FramePlan",
+    "FrameProgress",
+    "PlanStep",
+    "ProgressCallback",
+    "RadianceCache",
+    "plan_document",
+    "plan_frame",
+    "render_frame",
+    "run_frame",
+]

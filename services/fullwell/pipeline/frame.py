@@ -1,0 +1,338 @@
+"""One frame from description to published products; the manifest, written last, is the commit point."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fullwell.core.errors import CancelledError, ConflictError, NotFoundError
+from fullwell.core.hashing import sha256_hex
+from fullwell.core.rng import seed32, stream
+from fullwell.dataset import encode
+from fullwell.isp import develop
+from fullwell.labels import Labels, labels_document, make_labels
+from fullwell.optics import compute_irradiance
+from fullwell.pipeline.cache import RadianceCache
+from fullwell.pipeline.keys import frame_digest, radiance_key
+from fullwell.pipeline.plan import FramePlan, plan_document, plan_frame
+from fullwell.pipeline.progress import CancelCheck, FrameProgress, ProgressCallback
+from fullwell.radiometry import RadianceImage
+from fullwell.render import RenderStatistics, choose_variant, query_surfaces, render_radiance
+from fullwell.scene import Camera, Film
+from fullwell.scene.images import OpticalImage, RawImage
+from fullwell.schema.frame import CameraRig, FrameDescription, SensorRig
+from fullwell.sensor import SensorModel, expose, fixed_pattern_stream
+from fullwell.storage import ObjectStore
+
+__all__ = ["MANIFEST_NAME", "MANIFEST_SCHEMA", "render_frame"]
+
+MANIFEST_NAME = "manifest.json"
+MANIFEST_SCHEMA = "fullwell/manifest/v1"
+
+_VERSIONED = ("fullwell", "mitsuba", "drjit", "numpy", "scipy", "colour-science")
+
+
+def render_frame(
+    frame: FrameDescription,
+    store: ObjectStore,
+    prefix: str,
+    *,
+    cache: RadianceCache | None = None,
+    progress: ProgressCallback | None = None,
+    should_cancel: CancelCheck | None = None,
+) -> dict[str, Any]:
+    """Make the products that a frame asks for, publish them under `prefix`, and return the manifest.
+
+    A frame that is published already is returned at once, so running twice does nothing twice. Products are complete before
+    the manifest appears; what a crash leaves behind is products without a manifest, which nobody reads and the next run
+    overwrites with the same bytes.
+
+    Raises
+    ------
+    ConflictError
+        Another frame is published under this prefix.
+    CancelledError
+        `should_cancel` returned true; no manifest was written.
+    FullwellError
+        Any stage failed; no manifest was written.
+    """
+    digest = frame_digest(frame)
+    published = _published(store, prefix, digest)
+    if published is not None:
+        return published
+    run = _Run(frame, plan_frame(frame), cache or RadianceCache(), progress, should_cancel)
+    for position, rig in enumerate(frame.cameras):
+        _camera_products(run, rig, position)
+    run.report("store", 0.98)
+    listing = []
+    for name in sorted(run.products):
+        content = run.products[name]
+        info = store.put(f"{prefix}/{name}", content)
+        listing.append({"name": name, "bytes": len(content), "sha256": sha256_hex(content), "content_type": info.content_type})
+    manifest = _manifest(run, digest, listing)
+    try:
+        store.put(f"{prefix}/{MANIFEST_NAME}", encode.encode_json(manifest), if_absent=True)
+    except ConflictError:  # another worker finished the same frame first; its products are the same bytes
+        published = _published(store, prefix, digest)
+        if published is None:
+            raise
+        return published
+    run.report("done", 1.0)
+    return manifest
+
+
+def _published(store: ObjectStore, prefix: str, digest: str) -> dict[str, Any] | None:
+    try:
+        manifest: dict[str, Any] = encode.decode_json(store.get(f"{prefix}/{MANIFEST_NAME}"))
+    except NotFoundError:
+        return None
+    if manifest.get("frame_digest") != digest:
+        raise ConflictError(
+            f"another frame is published under {prefix!r} (recipe {manifest.get('recipe_name')!r}, frame "
+            f"{manifest.get('index')}); choose another destination or remove that one."
+        )
+    return manifest
+
+
+@dataclass(slots=True)
+class _Run:
+    """What accumulates while a frame runs."""
+
+    frame: FrameDescription
+    plan: FramePlan
+    cache: RadianceCache
+    progress: ProgressCallback | None
+    should_cancel: CancelCheck | None
+    products: dict[str, bytes] = field(default_factory=dict)
+    cameras: list[dict[str, Any]] = field(default_factory=list)
+    stages: list[dict[str, Any]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    instance_table: tuple[tuple[str, int], ...] = ()
+    started: float = field(default_factory=time.time)
+
+    def report(self, stage: str, fraction: float) -> None:
+        """Tell where the frame is; stop where it was cancelled."""
+        self.check()
+        if self.progress is not None:
+            self.progress(FrameProgress(stage, min(1.0, fraction)))
+
+    def check(self) -> None:
+        """Raise CancelledError where the frame was cancelled."""
+        if self.should_cancel is not None and self.should_cancel():
+            raise CancelledError("the frame was cancelled; nothing was published")
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Time a stage."""
+        wall, cpu = time.perf_counter(), time.process_time()
+        yield
+        self.stages.append(
+            {
+                "stage": name,
+                "wall_s": round(time.perf_counter() - wall, 4),
+                "cpu_s": round(time.process_time() - cpu, 4),
+            }
+        )
+
+
+_RENDER_SHARE = 0.85
+"""Share of a camera's time that rendering is taken to need, for the progress bar only."""
+
+
+def _camera_products(run: _Run, rig: CameraRig, position: int) -> None:
+    frame, plan, name = run.frame, run.plan, rig.camera.name
+    base, share = position / len(frame.cameras), 0.97 / len(frame.cameras)
+    folder = f"{name}/" if len(frame.cameras) > 1 else ""
+    document: dict[str, Any] = {"name": name, "camera_to_world": rig.camera.camera_to_world.tolist(), "sensors": []}
+    images: tuple[RadianceImage, OpticalImage] | None = None
+    if plan.radiance:
+        radiance, statistics, key = _radiance(run, rig, base, share * _RENDER_SHARE)
+        document["radiance"] = _radiance_document(radiance, statistics, key)
+        _add(run, f"{folder}radiance.exr", lambda: encode.encode_radiance_exr(radiance))
+        if plan.optics:
+            run.report("optics", base + share * _RENDER_SHARE)
+            with run.stage(f"{name}: optics"):
+                optical = compute_irradiance(radiance, rig.camera.lens)
+            run.notes.extend(f"{name}: {note}" for note in optical.notes)
+            _add(run, f"{folder}irradiance.exr", lambda: encode.encode_irradiance_exr(optical))
+            images = (radiance, optical)
+    for number, sensor in enumerate(rig.sensors):
+        part = (number + 0.5) / len(rig.sensors)
+        run.report("sensor and labels", base + share * (_RENDER_SHARE + (1 - _RENDER_SHARE) * part))
+        inner = f"{folder}{sensor.name}/" if len(rig.sensors) > 1 else folder
+        document["sensors"].append(_sensor_products(run, rig, sensor, inner, images))
+    run.cameras.append(document)
+
+
+def _add(run: _Run, name: str, encoder: Any) -> None:
+    """Encode a product where the recipe asks for it."""
+    if name.rpartition("/")[2] in run.frame.outputs:
+        with run.stage(f"encode {name}"):
+            run.products[name] = encoder()
+
+
+def _radiance(run: _Run, rig: CameraRig, base: float, share: float) -> tuple[RadianceImage, RenderStatistics, str]:
+    frame = run.frame
+    key = radiance_key(frame, rig, variant=choose_variant().variant)
+    kept = run.cache.get(key)
+    if kept is not None:
+        run.notes.append(f"{rig.camera.name}: radiance reused from an earlier frame of this run (key {key[:12]})")
+        return (*kept, key)
+    run.report("render", base)
+    with run.stage(f"{rig.camera.name}: render"):
+        image, statistics = render_radiance(
+            frame.scene,
+            rig.camera,
+            frame.grid,
+            samples_per_pixel=frame.quality.samples_per_pixel,
+            max_depth=frame.quality.max_depth,
+            seed=seed32(frame.seed, "radiance", key),
+            progress=lambda fraction: run.report("render", base + share * fraction),
+            should_cancel=run.should_cancel,
+        )
+    run.cache.put(key, image, statistics)
+    return image, statistics, key
+
+
+def _radiance_document(image: RadianceImage, statistics: RenderStatistics, key: str) -> dict[str, Any]:
+    error = image.standard_error
+    return {
+        "key": key,
+        "variant": statistics.variant,
+        "samples_per_pixel": statistics.samples_per_pixel,
+        "passes": statistics.passes,
+        "bad_samples": statistics.bad_samples,
+        "relative_standard_error_rms": None if error is None else float(np.sqrt(np.mean(np.square(error, dtype=np.float64)))),
+    }
+
+
+def _sensor_products(
+    run: _Run,
+    rig: CameraRig,
+    sensor: SensorRig,
+    folder: str,
+    images: tuple[RadianceImage, OpticalImage] | None,
+) -> dict[str, Any]:
+    view = _sensor_view(rig.camera, sensor.model)
+    document: dict[str, Any] = {
+        "name": sensor.name,
+        "model": sensor.model.name,
+        "size_px": [sensor.model.cols, sensor.model.rows],
+        "pixel_pitch_m": sensor.model.pixel_pitch_m,
+        "intrinsics_px": view.intrinsics_px.tolist(),
+        "lens": _lens_document(rig.camera),
+    }
+    if run.plan.sensor and images is not None:
+        radiance, optical = images
+        raw = _expose(run, rig, sensor, optical)
+        document |= _raw_document(raw, sensor.model, radiance)
+        _add(run, f"{folder}raw.npz", lambda: encode.encode_raw_npz(raw))
+        _add(run, f"{folder}raw.tiff", lambda: encode.encode_raw_tiff(raw))
+        if run.plan.display:
+            with run.stage(f"{rig.camera.name}/{sensor.name}: isp"):
+                display = develop(raw, sensor.isp)
+            _add(run, f"{folder}image.png", lambda: encode.encode_rgb_png(display.rgb))
+    if run.plan.labels:
+        with run.stage(f"{rig.camera.name}/{sensor.name}: labels"):
+            hits = query_surfaces(run.frame.scene, view, should_cancel=run.should_cancel)
+            labels = make_labels(run.frame.scene, view, hits)
+        run.instance_table = labels.instance_table
+        _label_products(run, labels, view, folder)
+    return document
+
+
+def _sensor_view(camera: Camera, model: SensorModel) -> Camera:
+    """Return the camera with the sensor's own pixels as film: labels have one value per pixel."""
+    return Camera(camera.name, camera.camera_to_world, camera.lens, Film(model.rows, model.cols, model.pixel_pitch_m))
+
+
+def _expose(run: _Run, rig: CameraRig, sensor: SensorRig, optical: OpticalImage) -> RawImage:
+    with run.stage(f"{rig.camera.name}/{sensor.name}: sensor"):
+        return expose(
+            optical,
+            sensor.model,
+            sensor.exposure,
+            rng=stream(run.frame.seed, "sensor", run.frame.index, rig.camera.name, sensor.name),
+            fixed_pattern_rng=fixed_pattern_stream(sensor.model),
+            keep_mean_electrons=True,
+        )
+
+
+def _raw_document(raw: RawImage, model: SensorModel, radiance: RadianceImage) -> dict[str, Any]:
+    """Return what the capture was, and the Monte-Carlo error in units of the sensor's own noise."""
+    document: dict[str, Any] = {
+        "exposure_time_s": raw.exposure_time_s,
+        "adc_bits": raw.adc_bits,
+        "black_level_dn": raw.black_level_dn,
+        "white_level_dn": raw.white_level_dn,
+        "saturated_fraction": raw.saturated_fraction,
+    }
+    if raw.mean_electrons is not None:
+        mean_e = raw.mean_electrons.astype(np.float64)
+        document["mean_electrons"] = float(mean_e.mean())
+        if radiance.standard_error is not None and radiance.standard_error.shape == mean_e.shape:
+            noise_e = np.sqrt(mean_e + model.read_noise_e**2)
+            monte_carlo_e = radiance.standard_error * mean_e
+            ratio = np.divide(monte_carlo_e, noise_e, out=np.zeros_like(mean_e), where=noise_e > 0)
+            document["noise_ratio_rms"] = float(np.sqrt(np.mean(ratio**2)))
+    return document
+
+
+def _lens_document(camera: Camera) -> dict[str, Any]:
+    lens = camera.lens
+    return {
+        "kind": lens.kind,
+        "focal_length_m": lens.focal_length_m,
+        "f_number": lens.f_number,
+        "focus_distance_m": lens.focus_distance_m if np.isfinite(lens.focus_distance_m) else "inf",
+        "image_distance_m": lens.image_distance_m,
+    }
+
+
+def _label_products(run: _Run, labels: Labels, view: Camera, folder: str) -> None:
+    _add(run, f"{folder}depth.exr", lambda: encode.encode_depth_exr(labels.depth_z_m, labels.depth_range_m))
+    _add(run, f"{folder}normals.exr", lambda: encode.encode_normals_exr(labels.normals_camera))
+    _add(run, f"{folder}instances.png", lambda: encode.encode_ids_png(labels.instances))
+    _add(run, f"{folder}semantic.png", lambda: encode.encode_ids_png(labels.semantic.astype(np.uint32)))
+    _add(
+        run,
+        f"{folder}labels.json",
+        lambda: encode.encode_json(labels_document(labels, view.intrinsics_px, view.camera_to_world)),
+    )
+
+
+def _manifest(run: _Run, digest: str, products: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the manifest. Everything but `run` is the same whenever and wherever the frame is made."""
+    frame = run.frame
+    licences = sorted({licence for item in frame.scene.objects for licence in item.licences})
+    return {
+        "schema": MANIFEST_SCHEMA,
+        "frame_digest": digest,
+        "recipe_name": frame.recipe_name,
+        "recipe": encode.decode_json(frame.recipe_json.encode()),
+        "index": frame.index,
+        "count": frame.count,
+        "seed": frame.seed,
+        "varied": [{"path": path, "value": value} for path, value in frame.varied],
+        "wavelengths_nm": {"first": frame.grid.first_nm, "last": frame.grid.last_nm, "step": frame.grid.step_nm},
+        "plan": plan_document(run.plan),
+        "cameras": run.cameras,
+        "instances": [{"id": name, "instance": number} for name, number in run.instance_table],
+        "classes": [{"id": number + 1, "name": name} for number, name in enumerate(frame.scene.semantic_classes)],
+        "licences": licences,
+        "warnings": list(frame.warnings),
+        "products": products,
+        "versions": {name: importlib.metadata.version(name) for name in _VERSIONED},
+        "run": {
+            "started_unix_s": round(run.started, 3),
+            "seconds": round(time.time() - run.started, 3),
+            "stages": run.stages,
+            "notes": run.notes,
+        },
+    }

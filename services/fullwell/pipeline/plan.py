@@ -1,0 +1,88 @@
+"""What a frame needs, decided before anything runs: which stages, which are skipped, why, and at what cost in accuracy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from fullwell.scene import Dielectric
+from fullwell.schema.frame import CameraRig, FrameDescription
+
+__all__ = ["FramePlan", "PlanStep", "plan_document", "plan_frame"]
+
+_DISPLAY = frozenset({"image.png"})
+_SENSOR = _DISPLAY | {"raw.npz", "raw.tiff"}
+_OPTICAL = _SENSOR | {"irradiance.exr"}
+_RADIANCE = _OPTICAL | {"radiance.exr"}
+_LABELS = frozenset({"depth.exr", "normals.exr", "instances.png", "semantic.png", "labels.json"})
+
+
+@dataclass(frozen=True, slots=True)
+class PlanStep:
+    """One decision: what it is about, run or skip, the reason, and the bound on the error that a skip may cause."""
+
+    what: str
+    decision: Literal["run", "skip"]
+    why: str
+    error_bound: str = "none"
+
+
+@dataclass(frozen=True, slots=True)
+class FramePlan:
+    """The decisions of a frame, and the switches that the runner follows."""
+
+    steps: tuple[PlanStep, ...]
+    radiance: bool
+    optics: bool
+    sensor: bool
+    display: bool
+    labels: bool
+
+
+def plan_frame(frame: FrameDescription) -> FramePlan:
+    """Return the plan of a frame from its description alone; nothing is rendered."""
+    wanted = frozenset(frame.outputs)
+    stages = {
+        "radiance": _RADIANCE,
+        "optics": _OPTICAL,
+        "sensor": _SENSOR,
+        "display": _DISPLAY,
+        "labels": _LABELS,
+    }
+    switches = {name: bool(wanted & products) for name, products in stages.items()}
+    steps: list[PlanStep] = []
+    for name, products in stages.items():
+        needed = sorted(wanted & products)
+        if needed:
+            steps.append(PlanStep(name, "run", f"for {', '.join(needed)}"))
+        else:
+            steps.append(PlanStep(name, "skip", "no output asks for it"))
+    for rig in frame.cameras:
+        steps.extend(_camera_steps(frame, rig, switches["radiance"], switches["optics"]))
+    return FramePlan(steps=tuple(steps), **switches)
+
+
+def _camera_steps(frame: FrameDescription, rig: CameraRig, radiance: bool, optics: bool) -> list[PlanStep]:
+    camera = rig.camera
+    steps = []
+    if radiance:
+        size = f"{camera.film.cols} x {camera.film.rows}"
+        samples = frame.quality.samples_per_pixel
+        bands = f"{frame.grid.count} bands, {frame.grid.first_nm:g}-{frame.grid.last_nm:g} nm"
+        steps.append(PlanStep(f"{camera.name}: render", "run", f"{size} samples, {samples} rays each, {bands}"))
+        depth = frame.quality.max_depth
+        glass = any(isinstance(part.material, Dielectric) for item in frame.scene.objects for part in item.parts)
+        why = "glass in the scene" if glass else "no glass in the scene"
+        steps.append(PlanStep(f"{camera.name}: paths", "run", f"up to {depth} segments ({why})", "paths that are longer"))
+        if camera.lens.kind == "pinhole":
+            steps.append(PlanStep(f"{camera.name}: depth of field", "skip", "the lens is a pinhole"))
+        else:
+            steps.append(PlanStep(f"{camera.name}: depth of field", "run", f"thin lens at f/{camera.lens.f_number:g}"))
+    if optics and not camera.lens.diffraction:
+        steps.append(PlanStep(f"{camera.name}: diffraction", "skip", "the recipe turns it off", "not bounded: asked for"))
+    return steps
+
+
+def plan_document(plan: FramePlan) -> list[dict[str, Any]]:
+    """Return the plan's decisions as plain data for manifests."""
+    return [{"what": s.what, "decision": s.decision, "why": s.why, "error_bound": s.error_bound} for s in plan.steps]

@@ -1,0 +1,38 @@
+"""The job function that service and command line share: a recipe document and a frame number in, a published frame out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from fullwell.pipeline.cache import RadianceCache
+from fullwell.pipeline.frame import render_frame
+from fullwell.pipeline.progress import CancelCheck, FrameProgress, ProgressCallback
+from fullwell.schema import RecipeDocument, build_frame
+from fullwell.storage import ObjectStore
+
+__all__ = ["run_frame"]
+
+_process_cache = RadianceCache()
+"""One per process: successive frames of a job that share their radiance render once."""
+
+
+def run_frame(
+    document: RecipeDocument,
+    index: int,
+    store: ObjectStore,
+    prefix: str,
+    *,
+    base_dir: Path | None = None,
+    progress: ProgressCallback | None = None,
+    should_cancel: CancelCheck | None = None,
+) -> dict[str, Any]:
+    """Build frame `index` of the recipe, make it, publish it under `prefix` and return its manifest.
+
+    `base_dir` is the folder that the recipe's file names are relative to. Errors and idempotence are those of
+    `render_frame`; a frame number that the recipe does not have is a FieldError.
+    """
+    if progress is not None:
+        progress(FrameProgress("load", 0.0))
+    frame = build_frame(document, index, base_dir=base_dir)
+    return render_frame(frame, store, prefix, cache=_process_cache, progress=progress, should_cancel=should_cancel)
