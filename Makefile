@@ -17,9 +17,9 @@ DEMO_OUTPUT := demo-output
 help: ## Show this list
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/\1\t\2/p' $(MAKEFILE_LIST) | expand -t 14
 
-setup: $(STAMPS)/dev $(STAMPS)/llvm ## Install everything for development into .venv
+setup: $(STAMPS)/dev $(STAMPS)/libraries ## Install everything for development into .venv
 
-demo: $(STAMPS)/runtime $(STAMPS)/llvm ## Render the first example and say where its picture is
+demo: $(STAMPS)/runtime $(STAMPS)/libraries ## Render the first example and say where its picture is
 	@$(BIN)/fullwell render $(DEMO_RECIPE) -o $(DEMO_OUTPUT)
 	@$(BIN)/fullwell show $(DEMO_OUTPUT)
 
@@ -77,5 +77,5 @@ $(STAMPS)/runtime: $(STAMPS)/backend pyproject.toml
 	$(BIN)/python -m pip install -q -c $(CONSTRAINTS) --no-build-isolation -e '.[serve,traffic]'
 	@touch $@
 
-$(STAMPS)/llvm: | $(STAMPS)/runtime
-	@bash .ci/install-llvm $(BIN)/python && touch $@
+$(STAMPS)/libraries: | $(STAMPS)/runtime
+	@bash .ci/install-libraries $(BIN)/python && touch $@

@@ -103,9 +103,9 @@ def _doctor(
 
 
 def _print_table(findings: list[Finding]) -> None:
-    from rich.console import Console  # noqa: PLC0415 - commands import late
-    from rich.markup import escape  # noqa: PLC0415
-    from rich.table import Table  # noqa: PLC0415
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
 
     colours = {Health.OK: "green", Health.NOTE: "yellow", Health.BROKEN: "bold red"}
     table = Table(box=None, pad_edge=False, header_style="bold")
@@ -140,7 +140,7 @@ def _versions() -> list[Finding]:
 
 
 def _renderer() -> list[Finding]:
-    from fullwell.render.variant import choose_variant  # noqa: PLC0415 - commands import late
+    from fullwell.render.variant import choose_variant
 
     if importlib.util.find_spec("mitsuba") is None:
         found = "none: Mitsuba is not installed"
@@ -148,7 +148,7 @@ def _renderer() -> list[Finding]:
     try:
         choice = choose_variant(refresh=True)
     except FullwellError as error:
-        return [Finding("renderer", "variant", Health.BROKEN, str(error), "Unset FULLWELL_VARIANT, or install libllvm19.")]
+        return [Finding("renderer", "variant", Health.BROKEN, "none works", str(error))]
     findings = [
         Finding("renderer", "libLLVM", Health.OK if probe.usable else Health.NOTE, f"{probe.library} {probe.verdict}")
         for probe in choice.probes
@@ -167,8 +167,8 @@ def _traffic() -> list[Finding]:
     answer = subprocess.run([program, "--version"], capture_output=True, text=True, timeout=30, check=False)
     if answer.returncode != 0:
         lines = (answer.stderr or answer.stdout).strip().splitlines() or ["no message"]
-        advice = "Reinstall: pip install --force-reinstall eclipse-sumo"
-        return [Finding("traffic", "SUMO", Health.BROKEN, f"{program}: {lines[-1]}", advice)]
+        advice = "For traffic scenes: apt-get install libgl1 libx11-6 libxext6 libxrender1 libatomic1"
+        return [Finding("traffic", "SUMO", Health.NOTE, lines[-1], advice)]
     return [Finding("traffic", "SUMO", Health.OK, f"{answer.stdout.splitlines()[0]} ({program})")]
 
 

@@ -49,6 +49,8 @@ PROBE_LIMIT_S: Final = 60.0
 
 _PATH_VARIABLE: Final = "DRJIT_LIBLLVM_PATH"
 _FORCE_VARIABLE: Final = "FULLWELL_VARIANT"
+_NO_LIBRARY: Final = os.devnull
+"""Stands for the scalar renderer where a library is asked for: it exists everywhere and never changes."""
 
 _LIBRARY_FOLDERS: Final = (
     "/usr/lib/*-linux-gnu*",
@@ -68,15 +70,17 @@ _LIBRARY_NAMES: Final = ("libLLVM.so*", "libLLVM-*.so*", "libLLVM.dylib")
 # folder. Core dumps are off: an abort is an expected answer here. The image of a small lamp-lit scene exercises ray tracing,
 # virtual calls, a recorded loop and spectra; the first lines are the instructions that old versions cannot select.
 _PROBE_PROGRAM: Final = """
-import json, math, resource
+import json, math, resource, sys
 resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 import drjit as dr
 import mitsuba as mi
-mi.set_variant("llvm_ad_spectral")
-x = dr.linspace(mi.Float, -1.0, 1.0, 65)
-y = dr.minimum(x, 0.25) + dr.maximum(x, -0.25) + dr.fma(x, x, dr.sqrt(dr.abs(x)))
-dr.eval(y)
-assert abs(float(y[64]) - 3.25) < 1e-5, "wrong arithmetic"
+mi.set_variant(sys.argv[1])
+scalar = sys.argv[1].startswith("scalar")
+if not scalar:
+    x = dr.linspace(mi.Float, -1.0, 1.0, 65)
+    y = dr.minimum(x, 0.25) + dr.maximum(x, -0.25) + dr.fma(x, x, dr.sqrt(dr.abs(x)))
+    dr.eval(y)
+    assert abs(float(y[64]) - 3.25) < 1e-5, "wrong arithmetic"
 scene = mi.load_dict({
     "type": "scene",
     "integrator": {"type": "path", "max_depth": 3},
@@ -89,9 +93,9 @@ scene = mi.load_dict({
     "lamp": {"type": "constant", "radiance": {"type": "uniform", "value": 1.0}},
 })
 image = mi.render(scene, spp=4, seed=1)
-mean = float(dr.mean(image, axis=None).array[0])
+mean = float(dr.mean(dr.ravel(image)) if scalar else dr.mean(image, axis=None).array[0])
 assert math.isfinite(mean) and mean > 0.0, "wrong image"
-print(json.dumps({"llvm": list(dr.detail.llvm_version())}))
+print(json.dumps({"llvm": [] if scalar else list(dr.detail.llvm_version())}))
 """
 
 
@@ -151,12 +155,12 @@ def choose_variant(*, refresh: bool = False) -> VariantChoice:
     FieldError
         FULLWELL_VARIANT names an unknown variant.
     RenderError
-        Mitsuba is not installed, or FULLWELL_VARIANT demands LLVM and no libLLVM works.
+        Mitsuba is not installed, cannot run at all, or FULLWELL_VARIANT demands LLVM and no libLLVM works.
     """
     versions = (_installed_version("mitsuba"), _installed_version("drjit"))
     forced = _forced_variant()
     if forced == SCALAR:
-        return VariantChoice(SCALAR, None, f"{_FORCE_VARIABLE} asks for the scalar renderer.", *versions, None, ())
+        return _scalar_choice(f"{_FORCE_VARIABLE} asks for the scalar renderer.", versions, (), refresh=refresh)
     probes: list[LlvmProbe] = []
     for library in _candidates():
         probe = _remembered_probe(library, versions, refresh=refresh)
@@ -169,7 +173,7 @@ def choose_variant(*, refresh: bool = False) -> VariantChoice:
     reason = _no_llvm_reason(probes)
     if forced == VECTORISED:
         raise RenderError(f"{_FORCE_VARIABLE} is {VECTORISED}, but {reason} Install libllvm19, or unset {_FORCE_VARIABLE}.")
-    return VariantChoice(SCALAR, None, f"{reason[0].upper()}{reason[1:]}", *versions, None, tuple(probes))
+    return _scalar_choice(f"{reason[0].upper()}{reason[1:]}", versions, tuple(probes), refresh=refresh)
 
 
 def activate() -> Any:
@@ -182,6 +186,16 @@ def activate() -> Any:
     if mitsuba.variant() != choice.variant:
         mitsuba.set_variant(choice.variant)
     return mitsuba
+
+
+def _scalar_choice(reason: str, versions: tuple[str, str], probes: tuple[LlvmProbe, ...], *, refresh: bool) -> VariantChoice:
+    """Return the last resort, once it has shown that it runs: a missing system library stops it as well."""
+    probe = _remembered_probe(_NO_LIBRARY, versions, refresh=refresh)
+    if not probe.usable:
+        raise RenderError(
+            f"Mitsuba is installed but {probe.verdict}. Install the system libraries it misses (libatomic1 is one)."
+        )
+    return VariantChoice(SCALAR, None, reason, *versions, None, probes)
 
 
 def _forced_variant() -> VariantName | None:
@@ -257,7 +271,8 @@ def _remembered_probe(library: str, versions: tuple[str, str], *, refresh: bool)
         status = Path(library).stat()
     except OSError as error:
         return LlvmProbe(library, usable=False, verdict=f"cannot be read ({error.strerror})")
-    key = digest_of([library, status.st_size, status.st_mtime_ns, versions, _processor(), _PROBE_PROGRAM])
+    dated = (0, 0) if library == _NO_LIBRARY else (status.st_size, status.st_mtime_ns)
+    key = digest_of([library, dated, versions, _processor(), _PROBE_PROGRAM])
     remembered = {} if refresh else _read_cache()
     if key in remembered:
         return remembered[key]
@@ -301,7 +316,7 @@ def _probe(library: str) -> tuple[LlvmProbe, bool]:
     with tempfile.TemporaryDirectory(prefix="fullwell-probe-") as empty_home:
         environment = {**os.environ, _PATH_VARIABLE: library, "HOME": empty_home}
         environment["PYTHONUSERBASE"] = site.getuserbase()
-        command = [sys.executable, "-P", "-c", _PROBE_PROGRAM]
+        command = [sys.executable, "-P", "-c", _PROBE_PROGRAM, SCALAR if library == _NO_LIBRARY else VECTORISED]
         try:
             child = subprocess.run(
                 command, env=environment, capture_output=True, text=True, timeout=PROBE_LIMIT_S, check=False, cwd=empty_home
@@ -314,12 +329,12 @@ def _probe(library: str) -> tuple[LlvmProbe, bool]:
     if child.returncode > 0:
         return LlvmProbe(library, usable=False, verdict=f"fails ({_complaint(child.stderr)})"), True
     answer = json.loads(child.stdout.strip().splitlines()[-1])
-    version = ".".join(str(part) for part in answer["llvm"])
+    version = ".".join(str(part) for part in answer["llvm"]) or None
     return LlvmProbe(library, usable=True, verdict="works", llvm_version=version), True
 
 
 def _complaint(text: str) -> str:
-    """Return the line of an error stream that says most: LLVM's own error, else the last one."""
+    """Return the line of an error stream that says most: LLVM's own error or a missing library, else the last one."""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
-    told = [line for line in lines if line.startswith("LLVM ERROR")] or lines
+    told = [line for line in lines if line.startswith("LLVM ERROR") or "cannot open shared object file" in line] or lines
     return told[-1][:200] if told else "no message"

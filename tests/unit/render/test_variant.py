@@ -26,11 +26,13 @@ def _library(folder: Path, name: str) -> str:
     return str(path)
 
 
-def _answer(monkeypatch: pytest.MonkeyPatch, working: set[str], *, final: bool = True) -> list[str]:
+def _answer(monkeypatch: pytest.MonkeyPatch, working: set[str], *, final: bool = True, scalar_runs: bool = True) -> list[str]:
     """Replace the child process: only `working` libraries work. Returns the list that tried ones are added to."""
     tried: list[str] = []
 
     def probe(library: str) -> tuple[variant.LlvmProbe, bool]:
+        if library == variant._NO_LIBRARY:
+            return variant.LlvmProbe(library, scalar_runs, "works" if scalar_runs else "fails (no libatomic.so.1)"), True
         tried.append(library)
         usable = library in working
         verdict = "works" if usable else "ends the process (SIGABRT: no message)"
@@ -101,6 +103,7 @@ def test_without_a_working_library_the_scalar_renderer_is_chosen_and_says_why(
 
 def test_without_any_library_the_reason_names_the_package_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     _only_files(monkeypatch)
+    _answer(monkeypatch, set())
     assert "libllvm19" in variant.choose_variant().reason
 
 
@@ -149,10 +152,18 @@ def test_a_cache_folder_that_cannot_be_made_costs_only_a_probe(tmp_path: Path, m
 
 def test_a_missing_library_is_reported_not_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _only_files(monkeypatch)
+    _answer(monkeypatch, set())
     monkeypatch.setenv("DRJIT_LIBLLVM_PATH", str(tmp_path / "nothing.so"))
     choice = variant.choose_variant()
     assert choice.variant == "scalar_spectral"
     assert "cannot be read" in choice.reason
+
+
+def test_a_renderer_that_runs_in_no_variant_is_an_error_that_says_what_it_misses(monkeypatch: pytest.MonkeyPatch) -> None:
+    _only_files(monkeypatch)
+    _answer(monkeypatch, set(), scalar_runs=False)
+    with pytest.raises(RenderError, match=r"libatomic\.so\.1.*libatomic1"):
+        variant.choose_variant()
 
 
 def test_scalar_can_be_forced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -184,6 +195,13 @@ def test_a_file_that_is_no_library_fails_in_the_child_only(tmp_path: Path) -> No
     assert not probe.usable
     assert final
     assert probe.verdict
+
+
+def test_the_scalar_renderer_is_tried_as_well() -> None:
+    pytest.importorskip("mitsuba")
+    probe, _ = variant._probe(variant._NO_LIBRARY)
+    assert probe.usable, probe.verdict
+    assert probe.llvm_version is None
 
 
 def test_the_chosen_renderer_renders(tmp_path: Path) -> None:
