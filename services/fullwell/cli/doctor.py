@@ -13,12 +13,15 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
 from fullwell import __version__
 from fullwell.core.errors import FullwellError
+
+if TYPE_CHECKING:
+    from fullwell.core.settings import Settings
 
 __all__ = ["Finding", "Health", "examine", "register"]
 
@@ -186,6 +189,69 @@ def _sumo_program() -> str | None:
     return shutil.which("sumo")
 
 
+def _services() -> list[Finding]:
+    """Try the addresses that are set. An embedded part is made when the service starts: only its folder has to be usable."""
+    from fullwell.core.settings import load_settings
+
+    try:
+        settings = load_settings()
+    except FullwellError as error:
+        return [Finding("services", "settings", Health.BROKEN, str(error), "Correct the variable, or unset it.")]
+    findings = [_home(settings.home)]
+    for name, address, attempt in (
+        ("database", settings.database_url, _try_database),
+        ("broker", settings.broker_url, _try_broker),
+        ("store", settings.store_url, _try_store),
+    ):
+        variable = f"FULLWELL_{name.upper()}_URL"
+        if not address:
+            findings.append(Finding("services", name, Health.OK, "embedded, in the home folder"))
+            continue
+        try:
+            findings.append(Finding("services", name, Health.OK, attempt(settings)))
+        except FullwellError as error:
+            advice = f"Start it, or correct {variable}, or unset it for the embedded one."
+            findings.append(Finding("services", name, Health.BROKEN, str(error), advice))
+    return findings
+
+
+def _home(home: Path) -> Finding:
+    existing = next(folder for folder in (home, *home.parents) if folder.exists())
+    if existing.is_dir() and os.access(existing, os.W_OK | os.X_OK):
+        return Finding("services", "home", Health.OK, str(home))
+    advice = "Set FULLWELL_HOME to a folder that you may write."
+    return Finding("services", "home", Health.BROKEN, f"{home}: {existing} cannot be written", advice)
+
+
+def _try_database(settings: Settings) -> str:
+    from fullwell.jobs.database import Database
+
+    database = Database(settings.database)
+    try:
+        current = database.is_current()
+    finally:
+        database.close()
+    return f"{database.shown_url} answers" + ("" if current else "; its tables are made when the service starts")
+
+
+def _try_broker(settings: Settings) -> str:
+    from fullwell.jobs.queue import CeleryTaskQueue
+
+    queue = CeleryTaskQueue(settings, settings.broker_url)
+    try:
+        queue.check()
+    finally:
+        queue.close()
+    return f"{settings.broker_url.rpartition('@')[2]} answers"
+
+
+def _try_store(settings: Settings) -> str:
+    from fullwell.storage import redacted_url, store_from_url
+
+    store_from_url(settings.store).check()
+    return f"{redacted_url(settings.store)} answers"
+
+
 def _machine() -> list[Finding]:
     memory = _available_memory_bytes()
     findings = [Finding("machine", "processors", Health.OK, f"{os.cpu_count()}")]
@@ -221,5 +287,6 @@ _CHECKS: Final[dict[str, Callable[[], list[Finding]]]] = {
     "versions": _versions,
     "renderer": _renderer,
     "traffic": _traffic,
+    "services": _services,
     "machine": _machine,
 }
