@@ -75,7 +75,13 @@ class RecipeBuilder:
     def frame(self, index: int) -> FrameDescription:
         """Return frame `index`, resolved and checked. Raises RecipeError, or FieldError where there is no such frame."""
         values = frame_values(self._document, index)
-        return self._build(_varied_document(self._document, values), values, index)
+        try:
+            return self._build(_varied_document(self._document, values), values, index)
+        except RecipeError as error:
+            if not values:
+                raise
+            varied = ", ".join(f"{path} = {_scalar(value)}" for path, value in values.items())
+            raise _told(error, f"In frame {index} vary sets {varied}.") from error
 
     def validate(self) -> tuple[str, ...]:
         """See the function `validate`."""
@@ -92,8 +98,7 @@ class RecipeBuilder:
                 if number < _BUILT_VALUES:
                     self._build(changed, values, 0)
             except RecipeError as error:
-                message = f"{error.message} ({where} sets {path}.)"
-                raise RecipeError(message, error.path, error.value) from error
+                raise _told(error, f"{where} sets {path}.") from error
         return first.warnings
 
     def _build(self, recipe: RecipeDocument, values: dict[str, Any], index: int) -> FrameDescription:
@@ -128,6 +133,11 @@ class RecipeBuilder:
             warnings=tuple(context.warnings),
             recipe_json=canonical_json(plain).decode(),
         )
+
+
+def _told(error: RecipeError, circumstance: str) -> RecipeError:
+    shown = circumstance if len(circumstance) <= 300 else circumstance[:297] + "..."
+    return RecipeError(f"{error.message} ({shown})", error.path, error.value)
 
 
 def _scalar(value: Any) -> str | int | float | bool:

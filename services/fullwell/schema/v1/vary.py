@@ -7,6 +7,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from fullwell.schema.errors import RecipeError
+from fullwell.schema.paths import parse_path
 from fullwell.schema.v1.common import Count, Document, Number, Positive, Range, Whole, refuse
 
 __all__ = ["Distribution", "RandomVariation", "VaryDocument"]
@@ -95,6 +97,15 @@ def check_order(document: Any) -> None:
 Distribution = Annotated[Uniform | LogUniform | Normal | Integer | Choice, Field(discriminator="distribution")]
 
 
+def _check_path(path: str, *at: str) -> None:
+    try:
+        first = parse_path(path)[0]
+    except RecipeError as error:
+        refuse(f"is no place to vary: {error.message}", *at, value=path)
+    if first in ("files", "name", "schema", "vary"):
+        refuse(f"is no place to vary: {first} is the same for all frames.", *at, value=path)
+
+
 class RandomVariation(Document):
     """`frames` draws of all `values` (path: distribution)."""
 
@@ -119,10 +130,12 @@ class VaryDocument(Document):
             refuse(
                 f"asks for {self.frame_count()} frames; must be <= {MAX_FRAMES}. Split the recipe.", value=self.frame_count()
             )
-        if self.random is not None:
-            for path in self.random.values:
-                if path in self.grid:
-                    refuse("is in grid and in random; keep one of them.", "grid", path)
+        for path in self.grid:
+            _check_path(path, "grid", path)
+        for path in {} if self.random is None else self.random.values:
+            _check_path(path, "random", "values", path)
+            if path in self.grid:
+                refuse("is in grid and in random; keep one of them.", "grid", path)
         return self
 
     def frame_count(self) -> int:
