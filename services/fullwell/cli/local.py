@@ -44,11 +44,14 @@ def render(
     as_json: JsonOption = False,
 ) -> None:
     """Make the frames of a recipe on this machine, in this process."""
-    from fullwell.pipeline import run_frame  # noqa: PLC0415
-    from fullwell.storage import LocalStore  # noqa: PLC0415
+    from fullwell.pipeline import run_frame
+    from fullwell.schema import RecipeBuilder
+    from fullwell.storage import LocalStore
 
     document = _load(recipe, overrides)
     wanted = _frame_range(frames, document.frame_count())
+    builder = RecipeBuilder(document, base_dir=document.base_dir)
+    builder.validate()  # a frame that cannot be made is found before the first one is
     folder = output if output is not None else Path("out") / document.name
     store = LocalStore(folder)
     finished: list[dict[str, Any]] = []
@@ -64,7 +67,7 @@ def render(
                 index,
                 store,
                 prefix,
-                base_dir=document.base_dir,
+                builder=builder,
                 progress=lambda at, bar=bar, index=index: bars.update(  # type: ignore[misc]
                     bar, completed=at.fraction, description=f"frame {index}: {at.stage}"
                 ),
@@ -93,10 +96,10 @@ def _summary(folder: Path, index: int, manifest: dict[str, Any]) -> dict[str, An
 
 def _forget_other(store: Any, prefix: str, document: RecipeDocument, index: int) -> None:
     """Remove a published frame that was made from another recipe; the same frame is left alone and reused."""
-    from fullwell.dataset.encode import decode_json  # noqa: PLC0415
-    from fullwell.pipeline import MANIFEST_NAME  # noqa: PLC0415
-    from fullwell.pipeline.keys import frame_digest  # noqa: PLC0415
-    from fullwell.schema import build_frame  # noqa: PLC0415
+    from fullwell.dataset.encode import decode_json
+    from fullwell.pipeline import MANIFEST_NAME
+    from fullwell.pipeline.keys import frame_digest
+    from fullwell.schema import build_frame
 
     key = f"{prefix}/{MANIFEST_NAME}"
     if store.exists(key):
@@ -108,16 +111,16 @@ def _forget_other(store: Any, prefix: str, document: RecipeDocument, index: int)
 
 def plan(recipe: RecipeArgument, overrides: SetOption = None, frame: int = 0, as_json: JsonOption = False) -> None:
     """Say what a frame would need, what is skipped and why; nothing is rendered."""
-    from fullwell.pipeline import plan_document, plan_frame  # noqa: PLC0415
-    from fullwell.schema import build_frame  # noqa: PLC0415
+    from fullwell.pipeline import plan_document, plan_frame
+    from fullwell.schema import build_frame
 
     document = _load(recipe, overrides)
     decided = plan_frame(build_frame(document, frame, base_dir=document.base_dir))
     if as_json:
         print(json.dumps({"frame": frame, "plan": plan_document(decided)}, indent=2))
         return
-    from rich.console import Console  # noqa: PLC0415
-    from rich.table import Table  # noqa: PLC0415
+    from rich.console import Console
+    from rich.table import Table
 
     table = Table("what", "decision", "why", "bound on the error", title=f"{document.name}, frame {frame}")
     for step in decided.steps:
@@ -127,8 +130,8 @@ def plan(recipe: RecipeArgument, overrides: SetOption = None, frame: int = 0, as
 
 def validate(recipe: RecipeArgument, overrides: SetOption = None, as_json: JsonOption = False) -> None:
     """Check a recipe and the files it names without rendering."""
-    from fullwell.schema import RecipeError  # noqa: PLC0415
-    from fullwell.schema import validate as validate_document  # noqa: PLC0415
+    from fullwell.schema import RecipeError
+    from fullwell.schema import validate as validate_document
 
     try:
         document = _load(recipe, overrides)
@@ -151,7 +154,7 @@ def show(
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Picture to write; default FRAME_DIR/show.png.")] = None,
 ) -> None:
     """Make one picture of all products of a frame."""
-    from fullwell.dataset.contact import picture_of_products  # noqa: PLC0415
+    from fullwell.dataset.contact import picture_of_products
 
     folder = _frame_folder(frame_dir)
     products = {
@@ -161,7 +164,7 @@ def show(
     }
     manifest = json.loads(products["manifest.json"])
     target = output if output is not None else folder / "show.png"
-    from fullwell.core.files import atomic_write  # noqa: PLC0415
+    from fullwell.core.files import atomic_write
 
     title = f"{manifest.get('recipe_name', folder.name)}, frame {manifest.get('index', 0)}"
     atomic_write(target, picture_of_products(products, title))
@@ -183,7 +186,7 @@ def _frame_folder(given: Path) -> Path:
 
 
 def _load(recipe: Path, overrides: list[str] | None) -> RecipeDocument:
-    from fullwell.schema import load_recipe  # noqa: PLC0415
+    from fullwell.schema import load_recipe
 
     return load_recipe(recipe, overrides=parse_overrides(overrides))
 
@@ -215,8 +218,8 @@ def _frame_range(text: str | None, count: int) -> range:
 
 
 def _progress(*, quiet: bool) -> Progress:
-    from rich.console import Console  # noqa: PLC0415
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn  # noqa: PLC0415
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     return Progress(
         TextColumn("{task.description}"),

@@ -8,7 +8,7 @@ from typing import Any
 from fullwell.pipeline.cache import RadianceCache
 from fullwell.pipeline.frame import render_frame
 from fullwell.pipeline.progress import CancelCheck, FrameProgress, ProgressCallback
-from fullwell.schema import RecipeDocument, build_frame
+from fullwell.schema import RecipeBuilder, RecipeDocument
 from fullwell.storage import ObjectStore
 
 __all__ = ["run_frame"]
@@ -24,15 +24,17 @@ def run_frame(
     prefix: str,
     *,
     base_dir: Path | None = None,
+    builder: RecipeBuilder | None = None,
     progress: ProgressCallback | None = None,
     should_cancel: CancelCheck | None = None,
 ) -> dict[str, Any]:
     """Build frame `index` of the recipe, make it, publish it under `prefix` and return its manifest.
 
-    `base_dir` is the folder that the recipe's file names are relative to. Errors and idempotence are those of
+    `base_dir` is the folder that the recipe's file names are relative to; `builder`, made once for the same document, spares
+    successive frames from reading its models again. Errors and idempotence are those of
     `render_frame`; a frame number that the recipe does not have is a FieldError.
     """
     if progress is not None:
         progress(FrameProgress("load", 0.0))
-    frame = build_frame(document, index, base_dir=base_dir)
+    frame = (builder or RecipeBuilder(document, base_dir=base_dir)).frame(index)
     return render_frame(frame, store, prefix, cache=_process_cache, progress=progress, should_cancel=should_cancel)
