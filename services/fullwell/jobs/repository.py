@@ -10,7 +10,7 @@ import secrets
 import time
 from collections.abc import Iterable, Sequence
 
-from sqlalchemy import delete, func, insert, or_, select, text, update
+from sqlalchemy import and_, delete, func, insert, or_, select, text, update
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
@@ -217,12 +217,23 @@ class JobRepository:
                 raise NotFoundError(f"job {job_id} has no frame {number}; its frames are 0 to {job.frame_count - 1}")
             return _frame_record(row)
 
-    def changed_frames(self, job_id: str, *, since: float, limit: int) -> list[FrameRecord]:
-        """Return up to `limit` frames that changed at or after the Unix time `since` [s], oldest change first."""
-        query = select(FrameRow).where(FrameRow.job_id == job_id, FrameRow.changed_at >= since)
+    def changed_frames(self, job_id: str, *, since: float, after: int = -1, limit: int) -> list[FrameRecord]:
+        """Return up to `limit` frames in order of their last change (Unix time [s]) and number.
+
+        Those that changed later than `since`, and of those that changed just then the ones with a number above `after`.
+        """
+        later = or_(FrameRow.changed_at > since, and_(FrameRow.changed_at == since, FrameRow.number > after))
+        query = select(FrameRow).where(FrameRow.job_id == job_id, later)
         with self._database.reading() as session:
             rows = session.scalars(query.order_by(FrameRow.changed_at, FrameRow.number).limit(limit))
             return [_frame_record(row) for row in rows]
+
+    def last_change(self, job_id: str) -> float:
+        """Return when a frame of the job changed last (Unix time [s])."""
+        with self._database.reading() as session:
+            job = self._job_row(session, job_id)
+            last = session.scalar(select(func.max(FrameRow.changed_at)).where(FrameRow.job_id == job_id))
+            return job.created_at if last is None else float(last)
 
     def attempts(self, job_id: str, number: int) -> list[AttemptRecord]:
         """Return every attempt at a frame, in order."""
