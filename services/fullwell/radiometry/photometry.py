@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fullwell.core.constants import LUMINOUS_EFFICACY_LM_PER_W
 from fullwell.core.errors import FieldError
+from fullwell.radiometry.illuminants import planck_radiance
 from fullwell.radiometry.spectrum import Spectrum
 from fullwell.radiometry.tables import table_spectrum
 
@@ -26,6 +28,7 @@ __all__ = [
     "tristimulus",
 ]
 
+_FARTHEST_UV = 0.05
 _OBSERVER_RANGE_NM = np.array([360.0, 830.0])
 
 
@@ -120,12 +123,42 @@ def chromaticity(spectrum: Spectrum) -> tuple[float, float]:
 
 
 def correlated_colour_temperature_k(spectrum: Spectrum) -> float:
-    """Return the correlated colour temperature [K], within about 2 K for daylight and lamps from 3000 to 50000 K.
+    """Return the correlated colour temperature [K] of light between 1000 and 100000 K, to 1e-4.
+
+    The temperature whose blackbody is nearest in the CIE 1960 (u, v) diagram. Raises FieldError where that is beyond those
+    limits, or farther than 0.05 away, where the CIE no longer speaks of a colour temperature.
 
     References
     ----------
-    McCamy 1992, Color Research and Application 17, 142: the cubic in (x - 0.3320) / (0.1858 - y). Coarse below 2500 K.
+    CIE 15:2004, section 9.5.
     """
-    x, y = chromaticity(spectrum)
-    slope = (x - 0.3320) / (0.1858 - y)
-    return ((449.0 * slope + 3525.0) * slope + 6823.3) * slope + 5520.33
+    xyz = tristimulus(spectrum)
+    if not xyz.sum() > 0:
+        raise FieldError("the spectrum has no light within 360 to 830 nm, so it has no colour temperature.")
+    u, v = _uv_1960(xyz)
+    mired, locus_u, locus_v = _planckian_locus()
+    squared = (locus_u - u) ** 2 + (locus_v - v) ** 2
+    nearest = int(np.argmin(squared))
+    if nearest in (0, mired.size - 1) or squared[nearest] > _FARTHEST_UV**2:
+        raise FieldError("the light is too far from any blackbody of 1000 to 100000 K to have a colour temperature.")
+    before, here, after = squared[nearest - 1 : nearest + 2]
+    # The squared distance is a parabola in mired to far better than the grid's step.
+    offset = 0.5 * (before - after) / (before - 2.0 * here + after)
+    return float(1e6 / (mired[nearest] + offset * (mired[1] - mired[0])))
+
+
+def _uv_1960(xyz: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    x, y, z = xyz
+    divisor = x + 15.0 * y + 3.0 * z
+    return 4.0 * x / divisor, 6.0 * y / divisor
+
+
+@cache
+def _planckian_locus() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return mired (n,) from 10 to 1000 and the locus' u and v (n,)."""
+    mired = np.arange(9.0, 1001.5, 1.0)
+    curves = colour_matching_functions()
+    wavelength_nm = curves[0].wavelength_nm
+    radiance = np.stack([planck_radiance(wavelength_nm, 1e6 / step) for step in mired])
+    u, v = _uv_1960(np.stack([radiance @ curve.values for curve in curves]))
+    return mired, u, v

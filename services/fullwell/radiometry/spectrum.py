@@ -13,7 +13,7 @@ from fullwell.radiometry.grid import WavelengthGrid
 
 __all__ = ["Spectrum"]
 
-_PRODUCT_TOLERANCE = 1e-6
+_PRODUCT_TOLERANCE = 3e-7
 _MOST_PARTS = 128
 _NEGLIGIBLE_BEND = 1e-8
 
