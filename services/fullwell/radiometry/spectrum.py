@@ -14,7 +14,7 @@ from fullwell.radiometry.grid import WavelengthGrid
 __all__ = ["Spectrum"]
 
 _PRODUCT_TOLERANCE = 3e-7
-_MOST_PARTS = 128
+_MOST_PARTS = 256
 _NEGLIGIBLE_BEND = 1e-8
 
 
