@@ -36,6 +36,8 @@ __all__ = [
 
 MAX_COORDINATE_M = 1e7
 """Beyond this, float64 millimetres are fine but no scene is meant: it is a slip of units."""
+_LARGEST = 1e30
+"""Squares and sums of this stay finite in float64; nothing physical in a recipe is larger."""
 _EXPONENT_NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)[eE][-+]?\d+")
 _INFINITIES = {"inf": math.inf, "+inf": math.inf, ".inf": math.inf, "Infinity": math.inf, "infinity": math.inf}
 
@@ -114,6 +116,8 @@ class Range:
             number = value if isinstance(value, int) else int(number)
         if outside:
             refuse(f"is {_shown(value)}; must be {self.legal}.", value=value)
+        if _LARGEST < abs(number) < math.inf:
+            refuse(f"is {_shown(value)}; no quantity is larger than {_LARGEST:g}.", value=value)
         return number
 
     def _with_bounds(self) -> str:
@@ -150,6 +154,9 @@ class TextPattern:
         return {"type": "string", "pattern": f"^(?:{self.pattern})$"}
 
 
+_SHORTEST_DIRECTION = 1e-12
+
+
 @dataclass(frozen=True, slots=True)
 class _Vector:
     """A list of exactly `length` numbers, each within `bounds`; `nonzero` refuses the null vector."""
@@ -168,7 +175,7 @@ class _Vector:
             except PydanticCustomError as error:
                 context = error.context or {}
                 refuse(str(context["sentence"]), position, value=context.get("given"))
-        if self.nonzero and not any(numbers):
+        if self.nonzero and not max(abs(number) for number in numbers) >= _SHORTEST_DIRECTION:
             refuse(f"is {_shown(value)}; must not be the null vector.", value=value)
         return tuple(numbers)
 
@@ -197,7 +204,7 @@ Length = Annotated[float, Range(gt=0, le=MAX_COORDINATE_M)]
 Whole = Annotated[int, Range(whole=True)]
 Count = Annotated[int, Range(ge=1, whole=True)]
 Point = Annotated[tuple[float, float, float], _Vector(3, _COORDINATE)]
-Direction = Annotated[tuple[float, float, float], _Vector(3, Range(), nonzero=True)]
+Direction = Annotated[tuple[float, float, float], _Vector(3, Range(ge=-1e9, le=1e9), nonzero=True)]
 Vector = Annotated[tuple[float, float, float], _Vector(3, Range())]
 Sizes2 = Annotated[tuple[float, float], _Vector(2, Range(gt=0, le=MAX_COORDINATE_M))]
 Sizes3 = Annotated[tuple[float, float, float], _Vector(3, Range(gt=0, le=MAX_COORDINATE_M))]

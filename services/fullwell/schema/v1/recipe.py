@@ -24,6 +24,7 @@ __all__ = [
     "RecipeDocument",
     "SceneDocument",
     "SpectralDocument",
+    "json_schema",
 ]
 
 SCHEMA_NAME = "fullwell/recipe/v1"
@@ -228,3 +229,9 @@ class RecipeDocument(Document):
     def canonical_json(self) -> str:
         """Return the recipe as canonical JSON text: equal for equal recipes, and itself a legal recipe."""
         return canonical_json(self.plain()).decode()
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON schema (draft 2020-12) of recipes. What only the reader checks (names, files) is not in it."""
+    schema = RecipeDocument.model_json_schema(by_alias=True)
+    return schema | {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "Fullwell recipe, version 1"}
