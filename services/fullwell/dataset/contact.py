@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -50,6 +50,10 @@ _GAP_PX = 14
 _HEADER_PX = 76
 _COLUMNS = 3
 _MAX_BOX_LABELS = 40
+_CROWD = 12
+_SCENERY_SHARE = 0.12
+"""In pictures with more than _CROWD boxes, those above this share of the picture are scenery: drawn thin, without a tag."""
+
 _TINY = 1e-30
 """Stands for the brightest value of a black picture, so that nothing is divided by 0."""
 
@@ -143,9 +147,11 @@ def _panels(frame: _Frame) -> Iterator[tuple[str, str, _Draw]]:
         yield "semantic.png", "classes", _draw_semantic
     if "normals.exr" in have:
         yield "normals.exr", "right: red, up: green, towards the camera: blue", _draw_normals
-    for name, note in (("radiance.exr", "W sr⁻¹ m⁻² nm⁻¹"), ("irradiance.exr", "W m⁻² nm⁻¹")):
+    for name, note in (("radiance.exr", "W / (sr m2 nm)"), ("irradiance.exr", "W / (m2 nm)")):
         if name in have:
             yield name, f"mean spectrum [{note}] and four bands", _spectral_drawing(name)
+    if "manifest.json" in have and len(have) > 1:
+        yield "manifest.json", "in brief", _draw_manifest
 
 
 # Header --------------------------------------------------------------------------------------------------------------
@@ -165,21 +171,18 @@ def _key_numbers(frame: _Frame) -> Iterator[str]:
         yield f"sensor {raw['sensor_name']}"
         yield f"exposure {_time_text(raw['exposure_time_s'])}"
         yield f"saturated {100 * raw['saturated_fraction']:.2g} %"
-    else:
-        exposure_s = _first(frame.manifest, "exposure_time_s")
-        if isinstance(exposure_s, int | float):
-            yield f"exposure {_time_text(exposure_s)}"
-    samples = _first(frame.manifest, "samples_per_pixel")
-    if isinstance(samples, int | float):
-        yield f"{samples:g} samples per pixel"
-    seed = _first(frame.manifest, "seed")
-    if isinstance(seed, int):
-        yield f"seed {seed}"
-    for key in ("total_seconds", "total_s", "seconds", "elapsed_s", "render_s", "render_seconds"):
-        seconds = _first(frame.manifest, key)
-        if isinstance(seconds, int | float):
-            yield f"{seconds:.2f} s"
-            break
+    elif isinstance(exposure_s := _first(frame.manifest, "exposure_time_s"), int | float):
+        yield f"exposure {_time_text(exposure_s)}"
+    for key, words in (("samples_per_pixel", "{:g} samples per pixel"), ("seed", "seed {:d}"), ("seconds", "made in {:.3g} s")):
+        value = _first(frame.manifest, key)
+        if isinstance(value, int | float):
+            yield words.format(value)
+    for entry in frame.manifest.get("varied", []):
+        yield f"{entry['path']} = {_value_text(entry['value'])}"
+
+
+def _value_text(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _first(document: Any, key: str) -> Any:
@@ -199,7 +202,7 @@ def _first(document: Any, key: str) -> Any:
 
 
 def _time_text(seconds: float) -> str:
-    for unit, factor in (("s", 1.0), ("ms", 1e3), ("µs", 1e6)):
+    for unit, factor in (("s", 1.0), ("ms", 1e3), ("us", 1e6)):
         if seconds * factor >= 1:
             return f"{seconds * factor:.4g} {unit}"
     return f"{seconds * 1e9:.3g} ns"
@@ -208,9 +211,85 @@ def _time_text(seconds: float) -> str:
 def _shortened(pen: ImageDraw.ImageDraw, text: str, width_px: float, size_px: int) -> str:
     if pen.textlength(text, font=font(size_px)) <= width_px:
         return text
-    while text and pen.textlength(text + "…", font=font(size_px)) > width_px:
+    while text and pen.textlength(text + "...", font=font(size_px)) > width_px:
         text = text[:-1]
-    return text + "…"
+    return text + "..."
+
+
+def _draw_manifest(panel: Image.Image, frame: _Frame) -> None:
+    """Camera, quality, time and warnings, in lines."""
+    pen = ImageDraw.Draw(panel)
+    y = 12
+    for name, text in _manifest_lines(frame.manifest):
+        words, line = text.split(), ""
+        pen.text((12, y), name, fill=FAINT, font=font(13))
+        for word in words:
+            longer = f"{line} {word}".strip()
+            if line and pen.textlength(longer, font=font(13)) > panel.width - 142:
+                pen.text((130, y), line, fill=INK, font=font(13))
+                y, line = y + 17, word
+            else:
+                line = longer
+        pen.text((130, y), line, fill=INK, font=font(13))
+        y += 22
+        if y > panel.height - 24:
+            return
+
+
+def _manifest_lines(manifest: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    if "index" in manifest and "count" in manifest:
+        yield "frame", f"{manifest['index']} of {manifest['count']}"
+    for camera in manifest.get("cameras", [])[:2]:
+        for sensor in camera.get("sensors", [])[:3]:
+            yield from _sensor_lines(sensor)
+        radiance = camera.get("radiance")
+        if radiance:
+            error = radiance.get("relative_standard_error_rms")
+            noise = "" if error is None else f", error {100 * error:.2g} % rms per pixel"
+            yield "rendering", f"{radiance.get('samples_per_pixel')} samples per pixel{noise}, {radiance.get('variant', '')}"
+    run = manifest.get("run", {})
+    stages = sorted(run.get("stages", []), key=lambda stage: -float(stage.get("wall_s", 0.0)))[:4]
+    if stages:
+        parts = ", ".join(f"{stage['stage'].rpartition(': ')[2]} {stage['wall_s']:.3g} s" for stage in stages)
+        yield "time", f"{run.get('seconds', 0):.3g} s: {parts}"
+    if manifest.get("licences"):
+        yield "licences", ", ".join(manifest["licences"])
+    for sentence in _grouped([str(note) for note in (*manifest.get("warnings", []), *run.get("notes", []))]):
+        yield "note", sentence
+
+
+def _grouped(sentences: Iterable[str]) -> Iterator[str]:
+    """Sentences that differ only in the field they begin with, told once."""
+    groups: dict[str, list[str]] = {}
+    for sentence in sentences:
+        first, _, rest = sentence.partition(" ")
+        field = first if "." in first or "[" in first else ""
+        groups.setdefault(rest if field else sentence, []).append(field)
+    for text, fields in groups.items():
+        more = f" (and {len(fields) - 1} more)" if len(fields) > 1 else ""
+        yield f"{fields[0]}{more} {text}".strip()
+
+
+def _sensor_lines(sensor: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    cols, rows = sensor.get("size_px", (0, 0))
+    pitch_um = 1e6 * float(sensor.get("pixel_pitch_m", 0.0))
+    yield "sensor", f"{sensor.get('model')}, {cols} x {rows} pixels of {pitch_um:.3g} um, {sensor.get('adc_bits', '?')} bits"
+    lens = sensor.get("lens")
+    if lens:
+        yield (
+            "lens",
+            f"{lens.get('kind')}, f = {1e3 * lens['focal_length_m']:.3g} mm, f/{lens['f_number']:.3g}".replace("_", " "),
+        )
+    if "exposure_time_s" in sensor:
+        mean = sensor.get("mean_electrons")
+        level = "" if mean is None else f", mean {mean:.0f} electrons"
+        yield (
+            "exposure",
+            f"{_time_text(sensor['exposure_time_s'])}{level}, {100 * sensor.get('saturated_fraction', 0):.2g} % saturated",
+        )
+    ratio = sensor.get("noise_ratio_rms")
+    if ratio is not None:
+        yield "noise ratio", f"{ratio:.2g} (error of rendering over noise of the sensor)"
 
 
 # Images and labels ---------------------------------------------------------------------------------------------------
@@ -235,19 +314,31 @@ def _draw_boxes(panel: Image.Image, frame: _Frame) -> None:
     pen = ImageDraw.Draw(panel)
     tags = Tags(pen, (0, 0, panel.width - 1, panel.height - 1), [])
     objects = frame.objects()
-    named = [entry for entry in objects if entry.get("class")] or objects
+    named = [entry for entry in objects if entry.get("class") and entry.get("bbox_visible_px")] or objects
+    crowd = len(named) > _CROWD
     for entry in reversed(named):
         box = entry.get("bbox_visible_px")
         if box:
             corners = [left + box[0] * factor, top + box[1] * factor, left + box[2] * factor - 1, top + box[3] * factor - 1]
             corners[2:] = max(corners[2], corners[0]), max(corners[3], corners[1])
-            pen.rectangle(corners, outline=distinct_colour(int(entry.get("class_id") or entry["instance"])), width=2)
-    for entry in named[:_MAX_BOX_LABELS]:
-        box = entry.get("bbox_visible_px")
-        if box:
+            scenery = crowd and _area(box) > _SCENERY_SHARE * pixels.shape[0] * pixels.shape[1]
             colour = distinct_colour(int(entry.get("class_id") or entry["instance"]))
-            text = f"{entry.get('class') or entry['id']} {entry.get('distance_m', 0):.3g} m"
-            tags.put((left + box[0] * factor, top + box[1] * factor), text, colour, size_px=12)
+            pen.rectangle(corners, outline=colour, width=1 if scenery else 2)
+    for entry in [entry for entry in named if entry.get("bbox_visible_px")][:_MAX_BOX_LABELS]:
+        box = entry["bbox_visible_px"]
+        text = f"{entry.get('class') or entry['id']} {entry.get('distance_m', 0):.3g} m"
+        width_px = pen.textlength(text, font=font(12))
+        # In a crowd, tags of the scenery and tags wider than what they name would hide the rest.
+        if crowd and (
+            _area(box) > _SCENERY_SHARE * pixels.shape[0] * pixels.shape[1] or width_px > 1.5 * (box[2] - box[0]) * factor + 60
+        ):
+            continue
+        colour = distinct_colour(int(entry.get("class_id") or entry["instance"]))
+        tags.put((left + box[0] * factor, top + box[1] * factor), text, colour, size_px=12)
+
+
+def _area(box: Sequence[float]) -> float:
+    return max(box[2] - box[0], 0) * max(box[3] - box[1], 0)
 
 
 def _draw_instances(panel: Image.Image, frame: _Frame) -> None:

@@ -99,7 +99,7 @@ def nice_ticks(low: float, high: float, *, about: int = 5) -> list[float]:
     power = 10.0 ** np.floor(np.log10(raw))
     step = float(power * min((m for m in (1, 2, 2.5, 5, 10) if m * power >= raw), default=10))
     first = np.ceil(low / step - 1e-9) * step
-    return [float(round(tick, 12)) for tick in np.arange(first, high + step * 1e-6, step)]
+    return [float(round(tick, 12)) + 0.0 for tick in np.arange(first, high + step * 1e-6, step)]
 
 
 def colour_bar(height_px: int, width_px: int) -> Image.Image:
