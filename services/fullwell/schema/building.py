@@ -30,7 +30,8 @@ def build_frame(
 ) -> FrameDescription:
     """Return frame `index` of a recipe, resolved and checked.
 
-    `base_dir` is the folder of its files (default: that of the recipe's file), `asset_reader` finds "asset:" references.
+    `base_dir` is the folder of its files (default: that of the recipe's file; a recipe that was not read from there may name
+    only files within it), `asset_reader` finds "asset:" references.
     For many frames of one recipe make one `RecipeBuilder`, which keeps the models it read. Raises RecipeError.
     """
     return RecipeBuilder(document, base_dir=base_dir, asset_reader=asset_reader).frame(index)
@@ -110,7 +111,9 @@ class RecipeBuilder:
         from fullwell.schema.frame import FrameDescription, Quality  # noqa: PLC0415
 
         if self._files is None:
-            self._files = RecipeFiles(self._base_dir, self._asset_reader, self._document.files)
+            # The owner of a recipe file may name any file; a recipe from elsewhere only those of the folder it is given.
+            confined = self._base_dir != self._document.base_dir
+            self._files = RecipeFiles(self._base_dir, self._asset_reader, self._document.files, confined=confined)
         grid = WavelengthGrid(recipe.spectral.first_nm, recipe.spectral.last_nm, recipe.spectral.step_nm)
         context = Context(grid, self._files)
         cameras = tuple(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from datetime import UTC, datetime
 from pathlib import Path
@@ -308,6 +309,20 @@ def test_assets_come_from_the_reader(with_model: dict[str, Any], tmp_path: Path)
 
     build_frame(load_recipe(with_model), asset_reader=reader)
     assert asked == ["thing"]
+
+
+@pytest.mark.parametrize("by_link", [False, True])
+def test_a_recipe_from_elsewhere_reads_nothing_outside_its_folder(
+    with_model: dict[str, Any], tmp_path: Path, by_link: bool
+) -> None:
+    folder = tmp_path / "job"
+    folder.mkdir()
+    (folder / "link.obj").symlink_to(tmp_path / "shape.obj")
+    with_model["scene"]["objects"][0]["geometry"]["file"] = "link.obj" if by_link else "../shape.obj"
+    with pytest.raises(RecipeError, match="outside the recipe's folder"):
+        build_frame(load_recipe(with_model), base_dir=folder)
+    (folder / "recipe.json").write_text(json.dumps(with_model))
+    build_frame(load_recipe(folder / "recipe.json"))  # its owner may
 
 
 def test_a_missing_file_is_answered_with_the_nearest_name(with_model: dict[str, Any], tmp_path: Path) -> None:

@@ -49,10 +49,16 @@ def located(path: str) -> Iterator[None]:
 
 
 class RecipeFiles:
-    """Files that a recipe names: found, hashed once, and models kept for the next frame."""
+    """Files that a recipe names: found, hashed once, and models kept for the next frame.
 
-    def __init__(self, base_dir: Path | None, asset_reader: AssetReader | None, expected: dict[str, str]) -> None:
+    With `confined`, files and what they refer to must stay within `base_dir`, links followed.
+    """
+
+    def __init__(
+        self, base_dir: Path | None, asset_reader: AssetReader | None, expected: dict[str, str], *, confined: bool
+    ) -> None:
         self._base_dir = base_dir
+        self._confined = confined
         self._asset_reader = asset_reader
         self._expected = expected
         self._digests: dict[tuple[str, int, int], str] = {}
@@ -80,7 +86,10 @@ class RecipeFiles:
             return packaged_model(reference, field_path=path).path
         if self._base_dir is None:
             fail(path, f"is {reference!r}, but this recipe has no folder; load it from a file, or use an asset.", reference)
-        return self._base_dir / reference
+        file = self._base_dir / reference
+        if self._confined and not file.resolve().is_relative_to(self._base_dir.resolve()):
+            fail(path, f"is {reference!r}, which lies outside the recipe's folder; put the file into it.", reference)
+        return file
 
     def _digest(self, file: Path, reference: str, path: str) -> str:
         status = file.stat()
@@ -95,6 +104,12 @@ class RecipeFiles:
             fail(path, f"is {reference!r}, whose SHA-256 is {digest}; files says {expected}. It was changed.", reference)
         return digest
 
+    def _root_of(self, file: Path) -> Path | None:
+        """Return the folder that a file's own references must stay within; None leaves it to the reader of models."""
+        if self._confined and self._base_dir is not None and file.resolve().is_relative_to(self._base_dir.resolve()):
+            return self._base_dir
+        return None
+
     def model(self, file: Path, digest: str, *, unit_m: float | None, up_axis: str | None, path: str) -> LoadedModel:
         """Return a model file's content, read once per digest and reading options."""
         from fullwell.assets.meshes import load_model  # noqa: PLC0415 - reading models is an extra
@@ -103,8 +118,15 @@ class RecipeFiles:
         if key not in self._models:
             if len(self._models) >= _KEPT_MODELS:
                 self._models.pop(next(iter(self._models)))
+            root = self._root_of(file)
             with located(path):
-                self._models[key] = load_model(file, unit_m=unit_m, up_axis=up_axis, field_path=path)  # type: ignore[arg-type]
+                self._models[key] = load_model(
+                    file,
+                    unit_m=unit_m,
+                    up_axis=up_axis,  # type: ignore[arg-type]
+                    field_path=path,
+                    root=root,
+                )
         return self._models[key]
 
 
