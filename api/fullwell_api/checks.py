@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from fullwell.core import FieldError, canonical_json
-from fullwell.jobs.files import blob_key, check_references
-from fullwell.schema import RecipeDocument, load_recipe
+from fullwell.jobs.files import blob_key, check_references, file_references
+from fullwell.schema import RecipeDocument, load_recipe, validate
 from fullwell_api.services import Services
 
 __all__ = ["check_blobs", "checked_document"]
@@ -24,7 +24,11 @@ def checked_document(recipe: Mapping[str, Any], overrides: Mapping[str, Any], fi
         raise FieldError("the recipe holds a number that is not one (NaN) or text that is not Unicode.", "recipe") from None
     # A mapping, never text: text could name a file of this machine.
     document = load_recipe(dict(recipe), overrides=overrides)
-    check_references(document.plain(), files)
+    plain = document.plain()
+    check_references(plain, files)
+    if not any(True for _ in file_references(plain)):
+        # Names of sensors, spectra and the like, and every value of `vary`. Model files are read by workers only.
+        validate(document)
     return document
 
 

@@ -16,6 +16,8 @@ from fullwell_api.services import Services
 
 __all__ = ["Metrics", "RequestMeter", "make_metrics"]
 
+API_PREFIX = "/v1"
+
 
 class _JobCollector(Collector):
     """Asks the database at each scrape: no figure lives in this process, so restarts and replicas do not matter."""
@@ -87,7 +89,15 @@ class RequestMeter:
         try:
             await self._app(scope, receive, noted)
         finally:
-            route = getattr(scope.get("route"), "path", "(none)")
+            route = _route_of(scope)
             method = scope["method"] if scope["method"] in ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE") else "other"
             self._metrics.requests.labels(method, route, str(status)).inc()
             self._metrics.seconds.labels(method, route).observe(time.perf_counter() - started)
+
+
+def _route_of(scope: Scope) -> str:
+    route: str | None = getattr(scope.get("route"), "path", None)
+    if route is None:
+        return "(none)"
+    # A route of an included router knows its own part of the path only.
+    return f"{API_PREFIX}{route}" if scope["path"].startswith(f"{API_PREFIX}/") and not route.startswith(API_PREFIX) else route

@@ -53,9 +53,7 @@ class Problem(BaseModel):
 
 
 def _described(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    return {
-        status: {"description": HTTPStatus(status).phrase, "model": Problem, "content": {MEDIA_TYPE: {}}} for status in statuses
-    }
+    return {status: {"description": HTTPStatus(status).phrase, "model": Problem} for status in statuses}
 
 
 PROBLEM_RESPONSES = _described(401, 404, 409, 413, 422, 500, 503)
@@ -151,8 +149,22 @@ def _of_anything(request: Request, error: Exception) -> Response:
     return problem_response(500, detail, instance=request.url.path, code="internal_error")
 
 
+def _with_media_type(document: dict[str, Any]) -> dict[str, Any]:
+    """Give problems their own media type in an OpenAPI document; the framework knows only that of the other answers."""
+    problem = {"$ref": "#/components/schemas/Problem"}
+    for path in document.get("paths", {}).values():
+        for operation in path.values():
+            for answer in operation.get("responses", {}).values():
+                contents = answer.get("content", {})
+                if any(content.get("schema") == problem for content in contents.values()):
+                    answer["content"] = {MEDIA_TYPE: {"schema": problem}}
+    return document
+
+
 def add_problem_handlers(app: FastAPI) -> None:
-    """Have the application answer every error with a problem."""
+    """Have the application answer every error with a problem, and say so in its OpenAPI document."""
+    plain_openapi = app.openapi
+    app.openapi = lambda: _with_media_type(plain_openapi())  # type: ignore[method-assign]
     app.add_exception_handler(FullwellError, _of_fullwell_error)  # type: ignore[arg-type]
     app.add_exception_handler(RequestValidationError, _of_validation_error)  # type: ignore[arg-type]
     app.add_exception_handler(HTTPException, _of_http_exception)  # type: ignore[arg-type]
