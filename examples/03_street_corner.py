@@ -172,20 +172,23 @@ GROUND = [
 ]
 
 BUILDINGS = [
-    building("house_south_east", "brick", [10, 26, 10], [12.2, 1, ], [2.2, 5.2, 8.2]),
+    building("house_south_east", "brick", [10, 26, 10], [12.2, 1], [2.2, 5.2, 8.2]),
     building("house_south_west", "plaster", [10, 24, 13], [-12.4, -1], [2.2, 5.2, 8.2, 11.2]),
     building("house_north_east", "concrete", [16, 18, 18], [15.4, 38.5], [2.2, 5.7, 9.2, 12.7, 16.2]),
     building("house_north_west", "brick", [14, 20, 12], [-14.2, 39.5], [2.2, 5.2, 8.2]),
     building("house_far", "plaster", [30, 12, 15], [0, 95], [2.2, 5.2, 8.2, 11.2]),
-]  # fmt: skip
+]
+
+RED, SILVER, BLUE = car_paint("#a8201a"), car_paint("#dcdcd8"), car_paint("#33536b")
+SALOON_SCALE = [2.1, 2.35, 1.75]
 
 TRAFFIC = [
-    model("car_ahead", "car", "car-normal-citrus.obj", NORTH, [2.0, 3.5, 0], scale=[2.1, 2.35, 1.75], paint_of=car_paint("#a8201a")),
-    model("car_oncoming", "car", "car-minibus-citrus.obj", 0, [-2.0, 9.0, 0], scale=[2.0, 2.3, 2.1], paint_of=car_paint("#dcdcd8")),
+    model("car_ahead", "car", "car-normal-citrus.obj", NORTH, [2.0, 3.5, 0], scale=SALOON_SCALE, paint_of=RED),
+    model("car_oncoming", "car", "car-minibus-citrus.obj", 0, [-2.0, 9.0, 0], scale=[2.0, 2.3, 2.1], paint_of=SILVER),
     model("car_crossing", "car", "car-microcargo-citrus.obj", EAST, [-6.5, 20.0, 0], scale=[2.05, 2.35, 1.9]),
-    model("car_far", "car", "car-normal-citrus.obj", NORTH, [2.0, 38.0, 0], scale=[2.1, 2.35, 1.75], paint_of=car_paint("#33536b")),
+    model("car_far", "car", "car-normal-citrus.obj", NORTH, [2.0, 38.0, 0], scale=SALOON_SCALE, paint_of=BLUE),
     model("tram", "tram", "tram.obj", WEST, [-1.5, 24.2, 1.88], scale=[2.0, 2.0, 2.0]),
-]  # fmt: skip
+]
 
 PEOPLE = [
     model("person_walking", "person", "humanResting.obj", 0, [5.3, 2.0, 0.14], paint_of=clothes("#40506a")),
