@@ -120,8 +120,8 @@ class SensorDocument(Document):
     """A sensor of the catalogue; any of its numbers may be given instead of the catalogue's."""
 
     name: Name = "main"
-    model: Text
-    exposure: ExposureDocument
+    model: Text = "imx363"
+    exposure: ExposureDocument = Field(default_factory=lambda: ExposureDocument(auto=AutoExposureDocument()))
     isp: IspDocument = Field(default_factory=IspDocument)
     rows: _Side | None = None
     cols: _Side | None = None

@@ -42,6 +42,9 @@ _PRODUCTS = (
 )
 """The same as ``fullwell.schema.frame.PRODUCTS`` (tested); not imported from there, so that documents load without arrays."""
 
+_DEFAULT_PRODUCTS = ("image.png", "raw.npz", "depth.exr", "instances.png", "semantic.png", "labels.json")
+"""A labelled camera frame; the labels cost a few per cent of the picture."""
+
 _RecipeName = Annotated[
     str,
     TextPattern(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,127}", "1 to 128 letters, digits, blanks or ._-, the first a letter or digit"),
@@ -176,7 +179,7 @@ class RecipeDocument(Document):
     spectral: SpectralDocument = Field(default_factory=SpectralDocument)
     scene: SceneDocument
     cameras: list[CameraDocument] = Field(min_length=1, max_length=64)
-    outputs: list[str] = Field(default_factory=lambda: ["image.png"], min_length=1)
+    outputs: list[str] = Field(default_factory=lambda: list(_DEFAULT_PRODUCTS), min_length=1)
     quality: QualityDocument = Field(default_factory=QualityDocument)
     vary: VaryDocument | None = None
     files: dict[str, _Digest] = Field(default_factory=dict)
