@@ -91,9 +91,11 @@ def load_model(
             unit_m=stage.unit_m if unit_m is None else unit_m,
             up_axis=stage.up_axis if up_axis is None else up_axis,
             warnings=stage.warnings,
+            references=stage.references,
         )
     warnings: list[str] = []
-    drafts = _read_with_trimesh(source, suffix, warnings)
+    files = ConfinedFiles(source, warnings)
+    drafts = _read_with_trimesh(source, suffix, files, warnings)
     chosen_up = _UP_BY_SUFFIX[suffix] if up_axis is None else up_axis
     if suffix not in (".glb", ".gltf"):
         assumed = ["1 m per unit"] * (unit_m is None) + [f"{chosen_up} up"] * (up_axis is None)
@@ -102,7 +104,14 @@ def load_model(
                 f"{file.name}: the format states neither unit nor up axis; {' and '.join(assumed)} assumed. "
                 "Set unit_m and up_axis."
             )
-    return finish_model(source, drafts, unit_m=1.0 if unit_m is None else unit_m, up_axis=chosen_up, warnings=warnings)
+    return finish_model(
+        source,
+        drafts,
+        unit_m=1.0 if unit_m is None else unit_m,
+        up_axis=chosen_up,
+        warnings=warnings,
+        references=files.read_files,
+    )
 
 
 def _check_overrides(*, unit_m: float | None, up_axis: str | None, field_path: str) -> None:
@@ -145,9 +154,8 @@ def _missing_problem(file: Path) -> str:
     return f"does not exist in {file.parent}{hint}"
 
 
-def _read_with_trimesh(source: ModelSource, suffix: str, warnings: list[str]) -> list[PartDraft]:
+def _read_with_trimesh(source: ModelSource, suffix: str, files: ConfinedFiles, warnings: list[str]) -> list[PartDraft]:
     content = source.file.read_bytes()
-    files = ConfinedFiles(source, warnings)
     # Cheap checks of headers first: a damaged count must not make the parser reserve memory for it.
     check: Callable[[ModelSource, bytes, ConfinedFiles], bytes] = PREFLIGHT[suffix]
     content = check(source, content, files)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -111,6 +111,9 @@ class LoadedModel:
         What was applied to the file's own coordinates: metres per unit, and the axis that became +z.
     warnings
         Sentences for the manifest: assumptions, repairs, features that are not drawn.
+    references
+        The other files that were read or are referred to (layers, materials, textures, buffers), sorted: the model is the
+        same as long as the file and these are.
     """
 
     parts: tuple[LoadedPart, ...]
@@ -118,6 +121,7 @@ class LoadedModel:
     unit_m: float
     up_axis: UpAxis
     warnings: tuple[str, ...]
+    references: tuple[Path, ...] = ()
 
     @property
     def triangle_count(self) -> int:
@@ -161,7 +165,13 @@ def linear_to_srgb(linear: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def finish_model(
-    source: ModelSource, drafts: Sequence[PartDraft], *, unit_m: float, up_axis: UpAxis, warnings: Sequence[str]
+    source: ModelSource,
+    drafts: Sequence[PartDraft],
+    *,
+    unit_m: float,
+    up_axis: UpAxis,
+    warnings: Sequence[str],
+    references: Iterable[Path] = (),
 ) -> LoadedModel:
     """Return the drafts as a checked model in metres with z up.
 
@@ -187,7 +197,8 @@ def finish_model(
         [np.min([p.vertices_m.min(axis=0) for p in parts], axis=0), np.max([p.vertices_m.max(axis=0) for p in parts], axis=0)]
     )
     notes.extend(_size_warnings(source, bounds_m, unit_m=unit_m))
-    return LoadedModel(tuple(parts), bounds_m, unit_m, up_axis, tuple(dict.fromkeys(notes)))
+    others = tuple(sorted(set(references)))
+    return LoadedModel(tuple(parts), bounds_m, unit_m, up_axis, tuple(dict.fromkeys(notes)), others)
 
 
 def _turn_up(up_axis: UpAxis) -> NDArray[np.float64]:

@@ -58,6 +58,7 @@ class ConfinedFiles:
         self._warnings = warnings
         self._base = source.file.parent
         self._root = source.root or source.file.parent
+        self.read_files: set[Path] = set()
         self.refusal: ModelError | None = None
         """The first refusal: parsers may swallow what `read` raises, so the caller looks here afterwards."""
 
@@ -84,6 +85,7 @@ class ConfinedFiles:
                 f"refers to {_short(reference)}, which has more than {self._source.max_bytes} bytes", "Make it smaller"
             )
         content = target.read_bytes()
+        self.read_files.add(target)
         if target.suffix.lower() in _IMAGE_SUFFIXES:
             self._check_image(reference, content)
         return content

@@ -29,6 +29,7 @@ class UsdStage:
     unit_m: float
     up_axis: UpAxis
     warnings: tuple[str, ...]
+    references: tuple[Path, ...]
 
 
 @dataclass(slots=True, eq=False)
@@ -39,6 +40,7 @@ class _Reading:
     root: Path
     warnings: list[str] = field(default_factory=list)
     surfaces: dict[str, SurfaceDraft] = field(default_factory=dict)
+    references: set[Path] = field(default_factory=set)
     triangles: int = 0
 
     def warn(self, sentence: str) -> None:
@@ -110,7 +112,8 @@ def _read_stage(reading: _Reading) -> UsdStage:
     if not (np.isfinite(unit_m) and unit_m > 0):
         raise reading.source.error(f"states metersPerUnit = {unit_m}; must be > 0", "Set unit_m")
     parts = tuple(_parts_of(reading, stage))
-    return UsdStage(parts, unit_m, "z" if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else "y", tuple(reading.warnings))
+    up_axis: UpAxis = "z" if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else "y"
+    return UsdStage(parts, unit_m, up_axis, tuple(reading.warnings), tuple(reading.references))
 
 
 def _check_references(reading: _Reading, file: str) -> None:
@@ -122,7 +125,8 @@ def _check_references(reading: _Reading, file: str) -> None:
     base = source.file.resolve().parent
     for path in [layer.realPath for layer in layers if layer.realPath] + [str(asset) for asset in assets]:
         outer = path.split("[", 1)[0]  # kit.usdz[texture.png] lies in kit.usdz
-        confined_path(source, _relative(outer, base), base=base, root=reading.root)
+        reading.references.add(confined_path(source, _relative(outer, base), base=base, root=reading.root))
+    reading.references.discard(source.file.resolve())
     for path in unresolved:
         name = str(path)
         confined_path(source, _relative(name, base), base=base, root=reading.root)

@@ -336,4 +336,6 @@ def test_a_wider_root_lets_files_share_a_folder(tmp_path: Path) -> None:
     (tmp_path / "shared.mtl").write_text("newmtl paint\nKd 1 0 0\n")
     (tmp_path / "model").mkdir()
     file = write_obj(tmp_path / "model", SQUARE_OBJ.replace("square.mtl", "../shared.mtl"), None)
-    assert load_model(file, root=tmp_path).parts[0].base_color_srgb == pytest.approx((1, 0, 0))
+    model = load_model(file, root=tmp_path)
+    assert model.parts[0].base_color_srgb == pytest.approx((1, 0, 0))
+    assert model.references == ((tmp_path / "shared.mtl").resolve(),)

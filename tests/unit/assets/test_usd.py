@@ -123,6 +123,7 @@ def test_references_payloads_variants_and_instances_are_composed(tmp_path: Path)
     }"""
     model = load(tmp_path, body)
     assert len(model.parts) == 4
+    assert model.references == ((tmp_path / "part.usda").resolve(),)
     assert_allclose(model.bounds_m, [[0, 0, 0], [6, 7, 9]])
 
 
