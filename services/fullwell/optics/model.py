@@ -24,6 +24,9 @@ OPTICS_TERMS: Final[tuple[OpticsTerm, ...]] = get_args(OpticsTerm)
 MAX_SKIPPED_CONTRAST_LOSS: Final = 0.005
 """Diffraction is left out where it would take less than this from the contrast at the image's Nyquist frequency."""
 
+_BRIGHTEST = 1e38
+"""Photons s^-1 m^-2 sr^-1 nm^-1; times the solid angle of the fastest lens this still fits single precision."""
+
 _BANDS_AT_A_TIME = 8
 """Bands copied out of the (rows, cols, bands) cube together: one cache line of float32 is then read about twice."""
 
@@ -83,9 +86,10 @@ def _check_radiance(radiance: RadianceImage) -> None:
         )
     # A NaN anywhere makes both extremes NaN, and every comparison with NaN is false.
     low, high = float(np.min(radiance.photons)), float(np.max(radiance.photons))
-    if not (low >= 0 and high < float("inf")):
+    if not (low >= 0 and high < _BRIGHTEST):
         raise FieldError(
-            f"radiance ranges from {low} to {high}; must be finite and >= 0. Look for the fault in the rendering stage.",
+            f"radiance ranges from {low} to {high}; must be finite and >= 0 (below {_BRIGHTEST:g}). Look for the fault in the "
+            "rendering stage.",
             path="radiance",
             value=low,
         )
@@ -124,19 +128,24 @@ def _form_image(
     pitch_m: float,
     workers: int,
 ) -> NDArray[np.float32]:
-    photons = np.empty_like(radiance.photons, dtype=np.float32)
+    photons = np.empty(radiance.photons.shape, dtype=np.float32)
     wavelengths = radiance.grid.centres_nm
     f_number = working_f_number(lens.f_number, lens.magnification)
+    # Transforms run in double precision: a headlight is 1e7 times brighter than the road beside it, and the rounding
+    # of a single-precision transform is a fraction of the brightest sample everywhere.
+    buffer = np.empty((min(_BANDS_AT_A_TIME, radiance.grid.count), radiance.rows, radiance.cols))
     for first in range(0, radiance.grid.count, _BANDS_AT_A_TIME):
         bands = range(first, min(first + _BANDS_AT_A_TIME, radiance.grid.count))
-        # Transforms run in double precision: a headlight is 1e7 times brighter than the road beside it, and the rounding
-        # of a single-precision transform is a fraction of the brightest sample everywhere.
-        block = np.moveaxis(radiance.photons[:, :, bands.start : bands.stop], 2, 0).astype(np.float64, order="C")
-        block *= on_axis[bands.start : bands.stop, None, None] * falloff
+        block = buffer[: len(bands)]
+        # Row by row, both sides of the transposition stay in the processor's cache: a third faster than at once.
+        for row in range(radiance.rows):
+            block[:, row] = radiance.photons[row, :, bands.start : bands.stop].T
         for k, band in zip(bands, block, strict=True):
+            np.multiply(band, on_axis[k] * falloff, out=band)
             if k in blurred_bands:
                 band[:] = diffract_band(
                     band, wavelength_nm=float(wavelengths[k]), f_number=f_number, pitch_m=pitch_m, workers=workers
                 )
-        photons[:, :, bands.start : bands.stop] = np.moveaxis(block, 0, 2)
+        for row in range(radiance.rows):
+            photons[row, :, bands.start : bands.stop] = block[:, row].T
     return photons
