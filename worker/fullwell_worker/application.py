@@ -23,8 +23,7 @@ from fullwell.jobs.records import RetryRule
 from fullwell.jobs.repository import JobRepository
 from fullwell.storage import store_from_url
 from fullwell_worker import health
-from fullwell_worker.execution import WorkerContext, run_frames
-from fullwell_worker.materials import JobFolder
+from fullwell_worker.execution import CurrentJob, WorkerContext, run_frames
 
 __all__ = ["make_worker", "wait_for_schema"]
 
@@ -48,7 +47,7 @@ class _Processes:
         if self._context is None or self._pid != os.getpid():
             repository = JobRepository(Database(self.settings.database))
             store = store_from_url(self.settings.store)
-            self._context = WorkerContext(self.name, self.settings, repository, store, JobFolder())
+            self._context = WorkerContext(self.name, self.settings, repository, store, CurrentJob())
             self._pid = os.getpid()
         return self._context
 

@@ -26,11 +26,20 @@ from fullwell.core.settings import Settings
 from fullwell.jobs.processes import current_process
 from fullwell.jobs.records import Lease, RetryRule
 from fullwell.jobs.repository import JobRepository
-from fullwell.schema import RecipeDocument, load_recipe
+from fullwell.schema import RecipeBuilder, RecipeDocument, load_recipe
 from fullwell.storage import ObjectStore
 from fullwell_worker.materials import JobFolder
 
-__all__ = ["FrameRunner", "Heart", "WorkerContext", "frame_prefix", "frame_runner", "run_frames"]
+__all__ = [
+    "CurrentJob",
+    "FrameRunner",
+    "Heart",
+    "PipelineRunner",
+    "WorkerContext",
+    "frame_prefix",
+    "frame_runner",
+    "run_frames",
+]
 
 T = TypeVar("T")
 MAX_BEAT_S = 2.0
@@ -38,6 +47,18 @@ PERMANENT = (FieldError, ShapeError, AssetError)
 """Errors that the same recipe would meet again: such a frame is not tried twice."""
 
 log = structlog.get_logger("fullwell.worker")
+
+
+class Progress(Protocol):
+    """Where a frame is; the pipeline's FrameProgress is one."""
+
+    @property
+    def stage(self) -> str:
+        """What is being done."""
+
+    @property
+    def fraction(self) -> float:
+        """How much of the frame is finished, in [0, 1]."""
 
 
 class FrameRunner(Protocol):
@@ -51,35 +72,64 @@ class FrameRunner(Protocol):
         prefix: str,
         *,
         base_dir: Path | None,
-        progress: Callable[[Any], None] | None,
+        progress: Callable[[Progress], None] | None,
         should_cancel: Callable[[], bool] | None,
     ) -> Any:
         """Return when the frame's manifest is in the store."""
         ...
 
 
-def _run_with_pipeline(
-    document: RecipeDocument,
-    index: int,
-    store: ObjectStore,
-    prefix: str,
-    *,
-    base_dir: Path | None,
-    progress: Callable[[Any], None] | None,
-    should_cancel: Callable[[], bool] | None,
-) -> Any:
-    from fullwell.pipeline import run_frame  # noqa: PLC0415 - loads the renderer: in the child, at its first frame
+class PipelineRunner:
+    """Runs frames with the real pipeline; keeps what builds the frames of the job at hand, with the models it has read."""
 
-    return run_frame(document, index, store, prefix, base_dir=base_dir, progress=progress, should_cancel=should_cancel)
+    def __init__(self) -> None:
+        self._document: RecipeDocument | None = None
+        self._builder: RecipeBuilder | None = None
+
+    def __call__(
+        self,
+        document: RecipeDocument,
+        index: int,
+        store: ObjectStore,
+        prefix: str,
+        *,
+        base_dir: Path | None,
+        progress: Callable[[Progress], None] | None,
+        should_cancel: Callable[[], bool] | None,
+    ) -> Any:
+        """Return the manifest of the published frame."""
+        from fullwell.pipeline import run_frame  # noqa: PLC0415 - loads the renderer: in the child, at its first frame
+
+        if self._builder is None or self._document is not document:
+            self._document, self._builder = document, RecipeBuilder(document, base_dir=base_dir)
+        return run_frame(document, index, store, prefix, builder=self._builder, progress=progress, should_cancel=should_cancel)
 
 
-frame_runner: FrameRunner = _run_with_pipeline
+frame_runner: FrameRunner = PipelineRunner()
 """What runs a frame; tests of the service put a stand-in here."""
 
 
 def frame_prefix(job_id: str, number: int) -> str:
     """Return the prefix of a frame's products in the object store."""
-    return f"jobs/{job_id}/frames/{number}/"
+    return f"jobs/{job_id}/frames/{number}"
+
+
+class CurrentJob:
+    """The job at hand: its document and its files, kept for its next frame."""
+
+    def __init__(self) -> None:
+        self._folder = JobFolder()
+        self._job_id = ""
+        self._document: RecipeDocument | None = None
+
+    def load(self, job_id: str, repository: JobRepository, store: ObjectStore) -> tuple[RecipeDocument, Path]:
+        """Return a job's document and the folder with its files."""
+        if self._document is None or self._job_id != job_id:
+            given = repository.input_of(job_id)
+            self._document = load_recipe(given.recipe_json, overrides=json.loads(given.overrides_json))
+            self._base_dir = self._folder.prepare(job_id, json.loads(given.files_json), store)
+            self._job_id = job_id
+        return self._document, self._base_dir
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +140,7 @@ class WorkerContext:
     settings: Settings
     repository: JobRepository
     store: ObjectStore
-    folder: JobFolder
+    job: CurrentJob
 
     @property
     def rule(self) -> RetryRule:
@@ -110,9 +160,9 @@ class Heart:
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._beat, name="lease", daemon=True)
 
-    def report(self, progress: Any) -> None:
+    def report(self, progress: Progress) -> None:
         """Take a FrameProgress; it goes to the database with the next beat."""
-        self._progress = (str(progress.stage), min(1.0, max(0.0, float(progress.fraction))))
+        self._progress = (progress.stage, min(1.0, max(0.0, progress.fraction)))
 
     def should_cancel(self) -> bool:
         """Return whether the job was cancelled or the lease was lost; cheap, to be asked between passes."""
@@ -163,9 +213,7 @@ def _run_leased(context: WorkerContext, lease: Lease) -> None:
     log.info("frame started")
     repository = context.repository
     with Heart(repository, lease, lease_s=context.settings.lease_s) as heart, _outcome(context, lease, heart):
-        given = repository.input_of(lease.job_id)
-        document = load_recipe(given.recipe_json, overrides=json.loads(given.overrides_json))
-        base_dir = context.folder.prepare(lease.job_id, json.loads(given.files_json), context.store)
+        document, base_dir = context.job.load(lease.job_id, repository, context.store)
         prefix = frame_prefix(lease.job_id, lease.number)
         try:
             frame_runner(
@@ -179,7 +227,7 @@ def _run_leased(context: WorkerContext, lease: Lease) -> None:
             )
         except ConflictError:
             # Another attempt has published the manifest first: the frame is done, by the other one's products.
-            if not context.store.exists(f"{prefix}manifest.json"):
+            if not context.store.exists(f"{prefix}/manifest.json"):
                 raise
         changed = _patiently(lambda: repository.complete(lease), context.settings.lease_s)
         log.info("frame done" if changed else "frame was done already", seconds=round(time.monotonic() - started, 3))

@@ -12,7 +12,6 @@ from typing import Any, Self
 
 import httpx
 
-from fullwell.client.errors import ApiError
 from fullwell.client.fetching import fetch_frame
 from fullwell.client.files import collect_files
 from fullwell.client.records import (
