@@ -6,6 +6,7 @@ import argparse
 import logging
 import os
 import sys
+from pathlib import Path
 
 from fullwell.core import FullwellError, ServiceError
 from fullwell.core.settings import Settings, load_settings
@@ -23,7 +24,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         settings = load_settings()
         if given.health:
-            print(f"alive, last sign of life {check_health(settings.health_file):.1f} s ago")
+            print(f"alive, last sign of life {max(map(check_health, _health_files(settings))):.1f} s ago")
             return 0
         return _run(settings, given.name)
     except FullwellError as error:
@@ -52,6 +53,12 @@ def _run(settings: Settings, name: str) -> int:
         + [f"--hostname={name or 'worker'}-{os.getpid()}@%h"]
     )
     return 0
+
+
+def _health_files(settings: Settings) -> list[Path]:
+    """Return the worker's health file, or those of the embedded service's workers."""
+    own = settings.health_file
+    return [own] if settings.worker_health_file or own.exists() else sorted(own.parent.glob("worker-*.health")) or [own]
 
 
 def _connected(settings: Settings) -> tuple[str, Settings]:

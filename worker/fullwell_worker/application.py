@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
+import subprocess
 import threading
 import time
 from typing import Any
@@ -19,11 +20,11 @@ from fullwell.core.settings import Settings
 from fullwell.jobs.children import die_with_parent
 from fullwell.jobs.database import Database
 from fullwell.jobs.queue import RENDER_TASK, celery_application
-from fullwell.jobs.records import RetryRule
 from fullwell.jobs.repository import JobRepository
 from fullwell.storage import store_from_url
 from fullwell_worker import health
 from fullwell_worker.execution import CurrentJob, WorkerContext, run_frames
+from fullwell_worker.loss import Loss, record_loss_in_a_process
 
 __all__ = ["make_worker", "wait_for_schema"]
 
@@ -33,15 +34,20 @@ log = structlog.get_logger("fullwell.worker")
 
 
 class _Processes:
-    """The context of the running process: made at first use, once per process, because connections do not survive a fork."""
+    """The context of the running process, made at first use after the fork.
+
+    The worker's main process forks children all its life, so it must never hold a database connection while it does: a
+    child would inherit SQLite's record of the locks that the parent's threads held at that moment, and wait for them for
+    ever. The main process therefore speaks to the database from a process of its own (`fullwell_worker.loss`), or when its
+    last child has ended.
+    """
 
     def __init__(self, settings: Settings, name: str) -> None:
         self.settings = settings
         self.name = name
-        self.rule = RetryRule(settings.max_attempts, settings.retry_delay_s)
+        self.shutting_down = threading.Event()
         self._pid = 0
         self._context: WorkerContext | None = None
-        self.shutting_down = threading.Event()
 
     def context(self) -> WorkerContext:
         if self._context is None or self._pid != os.getpid():
@@ -67,14 +73,14 @@ def _add_task(application: Celery, processes: _Processes) -> None:
         """A message in the worker's main process, which learns here that its child has died."""
 
         def on_failure(self, exc_info: Any, send_failed_event: bool = True, return_ok: bool = False) -> Any:
-            error = exc_info.exception
+            error = getattr(exc_info.exception, "exc", exc_info.exception)
             if isinstance(error, WorkerLostError | SystemExit):
-                _record_loss(processes, self.args, f"the worker's child process died: {error}", orderly=_cancelled(self))
+                _record_loss(processes, self, f"the worker's child process died: {error}")
             return super().on_failure(exc_info, send_failed_event=send_failed_event, return_ok=return_ok)
 
         def on_timeout(self, soft: bool, timeout: float) -> Any:
             if not soft:
-                _record_loss(processes, self.args, f"the time limit of {timeout:g} s was exceeded", orderly=False)
+                _record_loss(processes, self, f"the time limit of {timeout:g} s was exceeded")
             return super().on_timeout(soft, timeout)
 
     class FrameTask(Task):  # type: ignore[misc]
@@ -96,21 +102,14 @@ def _add_task(application: Celery, processes: _Processes) -> None:
             log.warning("message dropped", job=job_id, cause=str(error))
 
 
-def _cancelled(request: Any) -> bool:
-    return bool(getattr(request, "_already_cancelled", False))
-
-
-def _record_loss(processes: _Processes, arguments: Any, cause: str, *, orderly: bool) -> None:
+def _record_loss(processes: _Processes, request: Any, cause: str) -> None:
+    if processes.shutting_down.is_set() or getattr(request, "_already_cancelled", False):
+        return  # an orderly end: the frames are given back when the last child has ended
     try:
-        job_id, numbers = arguments
-        repository = processes.context().repository
-        if orderly or processes.shutting_down.is_set():
-            repository.release_worker(processes.name, cause="the worker was shut down")
-            return
-        for loss in repository.lose(job_id, numbers, worker=processes.name, cause=cause, rule=processes.rule):
-            log.warning("frame lost", job=loss.job_id, frame=loss.number, attempt=loss.attempt, cause=cause)
-    except (FullwellError, ValueError, TypeError) as error:
-        # The dispatcher finds the dead holder itself, a few seconds later.
+        job_id, numbers = request.args
+        record_loss_in_a_process(Loss(str(job_id), tuple(numbers), processes.name, cause))
+    except (OSError, subprocess.SubprocessError, ValueError, TypeError) as error:
+        # The dispatcher finds the dead holder itself, a few seconds later, if without this cause.
         log.warning("loss not recorded", cause=str(error))
 
 
@@ -121,6 +120,7 @@ def _add_handlers(processes: _Processes) -> None:
     @signals.worker_process_init.connect(weak=False)  # type: ignore[untyped-decorator]
     def _child_started(**_: Any) -> None:
         die_with_parent(parent)
+        threading.Thread(target=_beat_forever, args=(processes,), name="worker-beat", daemon=True).start()
 
     @signals.heartbeat_sent.connect(weak=False)  # type: ignore[untyped-decorator]
     def _alive(**_: Any) -> None:
@@ -129,7 +129,6 @@ def _add_handlers(processes: _Processes) -> None:
     @signals.worker_ready.connect(weak=False)  # type: ignore[untyped-decorator]
     def _ready(**_: Any) -> None:
         health.beat(file)
-        threading.Thread(target=_beat_forever, args=(processes,), name="worker-beat", daemon=True).start()
 
     @signals.worker_shutting_down.connect(weak=False)  # type: ignore[untyped-decorator]
     def _leaving(**_: Any) -> None:
@@ -148,12 +147,13 @@ def _add_handlers(processes: _Processes) -> None:
 
 
 def _beat_forever(processes: _Processes) -> None:
-    while not processes.shutting_down.is_set():
+    repository = JobRepository(Database(processes.settings.database))
+    while True:
         try:
-            processes.context().repository.beat_worker(processes.name)
+            repository.beat_worker(processes.name)
         except FullwellError as error:
             log.warning("no sign of life sent", cause=str(error))
-        processes.shutting_down.wait(BEAT_S)
+        time.sleep(BEAT_S)
 
 
 def wait_for_schema(database: Database) -> None:

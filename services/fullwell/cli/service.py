@@ -269,9 +269,9 @@ def _show_jobs(jobs: list[Job], *, as_json: bool) -> None:
         return
     from rich.console import Console
     from rich.markup import escape
-    from rich.table import Table
+    from rich.table import Column, Table
 
-    table = Table("job", "name", "state", "done", "failed", "submitted")
+    table = Table(Column("job", no_wrap=True, overflow="fold"), "name", "state", "done", "failed", "submitted")
     for job in jobs:
         done = f"{job.frames.done}/{job.frames.total}"
         when = f"{job.created_at.astimezone():%Y-%m-%d %H:%M}"

@@ -176,6 +176,8 @@ class _Service:
         self._add("api", command, {"FULLWELL_BROKER_URL": broker_url}, pass_fds=(descriptor,))
 
     def _start_workers(self, broker_url: str) -> None:
+        for old in (self._settings.home / "run").glob("worker-*.health"):  # of workers that were killed
+            old.unlink(missing_ok=True)
         for number in range(1, self._settings.workers + 1):
             name = f"worker-{number}"
             health_file = self._settings.home / "run" / f"{name}.health"
