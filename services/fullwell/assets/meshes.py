@@ -95,7 +95,9 @@ def load_model(
         )
     warnings: list[str] = []
     files = ConfinedFiles(source, warnings)
-    drafts = _read_with_trimesh(source, suffix, files, warnings)
+    # NaN and overflow in a file are found by the checks afterwards, not by warnings on the way.
+    with np.errstate(all="ignore"):
+        drafts = _read_with_trimesh(source, suffix, files, warnings)
     chosen_up = _UP_BY_SUFFIX[suffix] if up_axis is None else up_axis
     if suffix not in (".glb", ".gltf"):
         assumed = ["1 m per unit"] * (unit_m is None) + [f"{chosen_up} up"] * (up_axis is None)
@@ -219,8 +221,7 @@ def _drafts_of(
     linear = transform[:3, :3]
     normals = _file_normals(mesh)
     if not np.allclose(transform, np.eye(4)):
-        with np.errstate(over="ignore", invalid="ignore"):
-            vertices = vertices @ linear.T + transform[:3, 3]
+        vertices = vertices @ linear.T + transform[:3, 3]
         mirrored = np.linalg.det(linear) < 0
         if mirrored:
             faces = faces[:, ::-1]

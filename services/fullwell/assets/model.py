@@ -185,7 +185,8 @@ def finish_model(
         raise source.error(
             f"holds {total} triangles; at most {source.max_triangles} are allowed", "Simplify the model, or raise max_triangles"
         )
-    parts, removed = _finished_parts(source, drafts, to_world=unit_m * _turn_up(up_axis), notes=notes)
+    with np.errstate(all="ignore"):
+        parts, removed = _finished_parts(source, drafts, to_world=unit_m * _turn_up(up_axis), notes=notes)
     if removed:
         notes.append(f"{source.file.name}: {removed} of {total} triangles have no area and were removed.")
     if not parts:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from fullwell.assets.model import ModelSource, PartDraft, SurfaceDraft, UpAxis, linear_to_srgb
 from fullwell.assets.preflight import confined_path
 from fullwell.assets.surfaces import mean_srgb, pixels_of, tinted
+from fullwell.assets.usd_probe import first_line, layer_references, needs_probe, probe, remember_survivor
 
 __all__ = ["UsdStage", "default_root", "read_usd"]
 
@@ -75,25 +77,50 @@ def read_usd(source: ModelSource) -> UsdStage:
     delegate = UsdUtils.CoalescingDiagnosticDelegate()
     reading = _Reading(source, default_root(source.file) if source.root is None else source.root)
     try:
-        return _read_stage(reading)
-    except Tf.ErrorException as error:
-        raise source.error(f"is damaged ({_first_line(error)})", "Check it with usdchecker, or export it again") from error
+        # NaN and overflow in a file are found by the checks afterwards, not by warnings on the way.
+        with np.errstate(all="ignore"):
+            return _read_stage(reading)
+    except (Tf.ErrorException, RuntimeError, ValueError, TypeError) as error:
+        # Besides its own errors: text that is not UTF-8, attributes of another type than their name promises.
+        raise source.error(f"is damaged ({first_line(error)})", "Check it with usdchecker, or export it again") from error
     finally:
         delegate.TakeUncoalescedDiagnostics()
         del delegate
 
 
-def _first_line(error: Any) -> str:
-    """What USD says, without the source location of its own code."""
-    said = [str(item.commentary) for item in getattr(error, "args", ()) if hasattr(item, "commentary")]
-    lines = "\n".join(said or [str(error)]).strip().splitlines()
-    return lines[0].strip()[:200] if lines else type(error).__name__
+def _check_crate(source: ModelSource) -> None:
+    """Binary layers ("crates") begin with a table of contents whose sections must lie in the file.
+
+    The reader maps the file into memory and trusts these numbers: checking them here keeps most damage away from it.
+    """
+    size = source.file.stat().st_size
+    with source.file.open("rb") as stream:
+        head = stream.read(24)
+        if head[:8] != b"PXR-USDC":
+            return
+        problem = "is a damaged USD crate: its table of contents lies outside the file"
+        where = struct.unpack("<q", head[16:24])[0] if len(head) == 24 else -1
+        if not 88 <= where <= size - 8:
+            raise source.error(problem, "Copy or export it again")
+        stream.seek(where)
+        count = struct.unpack("<Q", stream.read(8))[0]
+        if not 1 <= count <= 64 or where + 8 + 32 * count > size:
+            raise source.error(problem, "Copy or export it again")
+        for _ in range(count):
+            _, start, length = struct.unpack("<16sqq", stream.read(32))
+            if start < 0 or length < 0 or start + length > size:
+                raise source.error(problem, "Copy or export it again")
 
 
 def _read_stage(reading: _Reading) -> UsdStage:
     from pxr import Sdf, Usd, UsdGeom  # noqa: PLC0415
 
     file = str(reading.source.file.resolve())
+    _check_crate(reading.source)
+    for reference in layer_references(reading.source.file):
+        confined_path(reading.source, reference, base=reading.source.file.resolve().parent, root=reading.root)
+    if needs_probe(reading.source.file):
+        probe(reading.source)
     layer = Sdf.Layer.FindOrOpen(file)
     if layer is None:
         raise reading.source.error("is damaged or not a USD layer", "Check it with usdchecker, or export it again")
@@ -104,14 +131,15 @@ def _read_stage(reading: _Reading) -> UsdStage:
     for error in stage.GetCompositionErrors():
         # A connection to a prim outside its reference loses a material input; anything else loses geometry.
         if "target path" not in str(error):
-            raise reading.source.error(f"cannot be composed ({_first_line(error)})", "Repair its references")
-        reading.warn(_first_line(error))
+            raise reading.source.error(f"cannot be composed ({first_line(error)})", "Repair its references")
+        reading.warn(first_line(error))
     unit_m = float(UsdGeom.GetStageMetersPerUnit(stage))
     if not stage.HasAuthoredMetadata(UsdGeom.Tokens.metersPerUnit):
         reading.warn(f"the layer states no metersPerUnit; USD's default of {unit_m:g} m is taken. Set unit_m.")
     if not (np.isfinite(unit_m) and unit_m > 0):
         raise reading.source.error(f"states metersPerUnit = {unit_m}; must be > 0", "Set unit_m")
     parts = tuple(_parts_of(reading, stage))
+    remember_survivor(reading.source.file, reading.references)
     up_axis: UpAxis = "z" if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else "y"
     return UsdStage(parts, unit_m, up_axis, tuple(reading.warnings), tuple(reading.references))
 
@@ -242,8 +270,7 @@ def _placed(
     """Points and normals in the stage's world (USD matrices act on row vectors), and whether the transform mirrors."""
     linear = matrix[:3, :3]
     mirrored = bool(np.linalg.det(linear) < 0)
-    with np.errstate(over="ignore", invalid="ignore"):
-        vertices = points @ linear + matrix[3, :3]
+    vertices = points @ linear + matrix[3, :3]
     if normals is not None:
         cofactors = np.array([np.cross(linear[1], linear[2]), np.cross(linear[2], linear[0]), np.cross(linear[0], linear[1])])
         normals = normals @ cofactors * (-1.0 if mirrored else 1.0)

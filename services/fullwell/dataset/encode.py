@@ -8,7 +8,9 @@ from __future__ import annotations
 import io
 import json
 import math
+import struct
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -217,7 +219,7 @@ def _decode_exr(content: bytes) -> tuple[dict[str, NDArray[np.float32]], dict[st
         with OpenEXR.File(io.BytesIO(content), separate_channels=True) as file:
             channels = {name: np.array(channel.pixels) for name, channel in file.channels().items()}
             metadata = json.loads(file.header().get(_METADATA, "{}"))
-    except RuntimeError as error:
+    except (RuntimeError, ValueError, OSError) as error:
         raise FieldError(f"the EXR file is damaged ({error}); fetch or render it again.") from error
     return channels, metadata
 
@@ -236,7 +238,7 @@ def encode_rgb_png(rgb: NDArray[np.uint8]) -> bytes:
 
 def decode_rgb_png(content: bytes) -> NDArray[np.uint8]:
     """Return the (rows, cols, 3) uint8 image of a PNG."""
-    return np.asarray(Image.open(io.BytesIO(content)).convert("RGB"), dtype=np.uint8).copy()
+    return np.asarray(_opened_png(content).convert("RGB"), dtype=np.uint8).copy()
 
 
 def encode_ids_png(ids: NDArray[np.uint32]) -> bytes:
@@ -260,10 +262,19 @@ def encode_ids_png(ids: NDArray[np.uint32]) -> bytes:
 
 def decode_ids_png(content: bytes) -> NDArray[np.uint32]:
     """Return the (rows, cols) uint32 ids that `encode_ids_png` wrote."""
-    values = np.asarray(Image.open(io.BytesIO(content)), dtype=np.uint32)
+    values = np.asarray(_opened_png(content), dtype=np.uint32)
     if values.ndim == 2:
         return values
     return values @ np.array([1, 256, 65536], dtype=np.uint32)
+
+
+def _opened_png(content: bytes) -> Image.Image:
+    try:
+        image = Image.open(io.BytesIO(content), formats=("PNG",))
+        image.load()
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        raise FieldError(f"the PNG file is damaged ({error}); fetch or render it again.") from error
+    return image
 
 
 def _png(image: Image.Image, info: PngInfo) -> bytes:
@@ -290,9 +301,12 @@ def encode_raw_npz(raw: RawImage) -> bytes:
 
 def decode_raw_npz(content: bytes) -> RawImage:
     """Return the raw image that `encode_raw_npz` wrote, exactly."""
-    with np.load(io.BytesIO(content), allow_pickle=False) as archive:
-        arrays = {name: archive[name] for name in archive.files}
-    metadata = json.loads(str(arrays[_METADATA]))
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        metadata = json.loads(str(arrays[_METADATA]))
+    except (OSError, ValueError, EOFError, KeyError, AttributeError, zipfile.BadZipFile, zlib.error) as error:
+        raise FieldError(f"the NPZ file is damaged ({error}); fetch or render it again.") from error
     return RawImage(
         dn=arrays["dn"],
         pattern=tuple(tuple(row) for row in metadata["pattern"]),
@@ -346,9 +360,12 @@ def decode_raw_tiff(content: bytes) -> tuple[NDArray[np.uint16], dict[str, Any]]
     """Return the DN and the metadata of the image description that `encode_raw_tiff` wrote."""
     import tifffile  # noqa: PLC0415
 
-    with tifffile.TiffFile(io.BytesIO(content)) as file:
-        page = file.pages[0]
-        return np.asarray(page.asarray(), dtype=np.uint16), json.loads(page.description)
+    try:
+        with tifffile.TiffFile(io.BytesIO(content)) as file:
+            page = file.pages[0]
+            return np.asarray(page.asarray(), dtype=np.uint16), json.loads(page.description)
+    except (tifffile.TiffFileError, OSError, ValueError, IndexError, struct.error) as error:
+        raise FieldError(f"the TIFF file is damaged ({error}); fetch or render it again.") from error
 
 
 def _raw_entries(raw: RawImage) -> dict[str, Any]:

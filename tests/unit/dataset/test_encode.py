@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import time
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -212,8 +213,19 @@ def test_the_same_arrays_give_the_same_bytes_at_any_time(make: object, monkeypat
     assert make() == first
 
 
-@pytest.mark.parametrize("decode", [encode.decode_radiance_exr, encode.decode_depth_exr, encode.decode_json])
-def test_damaged_bytes_are_refused(decode: object) -> None:
-    assert callable(decode)
-    with pytest.raises(FieldError, match="damaged"):
-        decode(b"garbage" * 20)
+DECODERS = [
+    (encode.decode_radiance_exr, lambda: encode.encode_radiance_exr(radiance())),
+    (encode.decode_json, lambda: encode.encode_json({"a": [1, 2, 3]})),
+    (encode.decode_rgb_png, lambda: encode.encode_rgb_png(np.zeros((9, 9, 3), np.uint8))),
+    (encode.decode_ids_png, lambda: encode.encode_ids_png(np.ones((9, 9), np.uint32))),
+    (encode.decode_raw_npz, lambda: encode.encode_raw_npz(raw())),
+    (encode.decode_raw_tiff, lambda: encode.encode_raw_tiff(raw())),
+]
+
+
+@pytest.mark.parametrize(("decode", "make"), DECODERS, ids=lambda function: getattr(function, "__name__", ""))
+def test_damaged_and_truncated_bytes_are_refused(decode: Callable[[bytes], object], make: Callable[[], bytes]) -> None:
+    whole = make()
+    for content in (b"", b"garbage" * 20, whole[: len(whole) // 2], whole[:20]):
+        with pytest.raises(FieldError, match="damaged"):
+            decode(content)
