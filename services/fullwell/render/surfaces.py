@@ -49,6 +49,9 @@ def query_surfaces(
         raise RenderError(f"the surface query failed: {error.__cause__ or error}") from error
 
 
+_MAX_PENDING_PAIRS = 20_000_000
+
+
 class _Layer:
     """One surface per ray that is still alive: pixel (n,), object (n,), range_m (n,), normal (n, 3) in world axes."""
 
@@ -70,7 +73,7 @@ def _collect(
     object_index = np.full(pixels, -1, dtype=np.int32)
     range_m = np.full(pixels, np.inf, dtype=np.float32)
     normals = np.zeros((pixels, 3), dtype=np.float32)
-    seen: NDArray[np.int64] = np.empty(0, dtype=np.int64)
+    seen: list[NDArray[np.int64]] = []
     for depth in range(_MAX_LAYERS):
         if should_cancel is not None and should_cancel():
             raise CancelledError("the label pass was cancelled; nothing was written")
@@ -82,8 +85,11 @@ def _collect(
             range_m[layer.pixel] = layer.range_m
             normals[layer.pixel] = layer.normal @ camera.camera_to_world[:3, :3]
         # A ray meets a closed object at least twice; each (pixel, object) pair counts once.
-        seen = np.union1d(seen, layer.pixel * objects + layer.objects)
-    amodal = np.bincount(seen % objects, minlength=objects)[: len(scene.objects)]
+        seen.append(layer.pixel * objects + layer.objects)
+        if sum(map(len, seen)) > _MAX_PENDING_PAIRS:
+            seen = [np.unique(np.concatenate(seen))]
+    pairs = np.unique(np.concatenate(seen)) if seen else np.empty(0, dtype=np.int64)
+    amodal = np.bincount(pairs % objects, minlength=objects)[: len(scene.objects)]
     return SurfaceHits(
         object_index=object_index.reshape(rows, cols),
         range_m=range_m.reshape(rows, cols),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from dataclasses import dataclass
 from typing import Any
 
@@ -56,11 +57,28 @@ class TranslatedScene:
     centre_m: NDArray[np.float64]
 
 
+_kept: list[tuple[SceneDescription, TranslatedScene]] = []
+"""The scene that was loaded last, so that the label pass does not load what the picture has just used."""
+
+
 def translate(mi: Any, scene: SceneDescription, centre_m: NDArray[np.float64]) -> TranslatedScene:
     """Load `scene` into the active Mitsuba variant with its origin moved to `centre_m` [m].
 
-    Raises RenderError with the renderer's own words where it refuses the scene.
+    The scene that was loaded last is kept and returned again for the same object and centre. Raises RenderError with the
+    renderer's own words where it refuses the scene.
     """
+    for kept_scene, translated in _kept:
+        if kept_scene is scene and np.array_equal(translated.centre_m, centre_m):
+            return translated
+    # The renderer's kernels depend on how many objects are alive: the old scene goes before the new one comes.
+    _kept.clear()
+    gc.collect()
+    loaded = _load(mi, scene, centre_m)
+    _kept.append((scene, loaded))
+    return loaded
+
+
+def _load(mi: Any, scene: SceneDescription, centre_m: NDArray[np.float64]) -> TranslatedScene:
     recentre = np.eye(4)
     recentre[:3, 3] = -np.asarray(centre_m, dtype=np.float64)
     contents: dict[str, Any] = {"type": "scene"}
