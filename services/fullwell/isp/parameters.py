@@ -11,7 +11,7 @@ from fullwell.radiometry.spectrum import Spectrum
 __all__ = ["Demosaic", "IspSettings", "WhiteBalance"]
 
 WhiteBalance = Literal["illuminant", "gray_world", "none"]
-Demosaic = Literal["bilinear"]
+Demosaic = Literal["bilinear", "malvar2004", "menon2007"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
