@@ -133,7 +133,7 @@ class RecipeBuilder:
             grid=grid,
             outputs=tuple(recipe.outputs),
             quality=Quality(recipe.quality.samples_per_pixel, recipe.quality.max_depth),
-            warnings=tuple(context.warnings),
+            warnings=context.all_warnings(),
             recipe_json=canonical_json(plain).decode(),
         )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import posixpath
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -61,6 +63,7 @@ class RecipeFiles:
         self._confined = confined
         self._asset_reader = asset_reader
         self._expected = expected
+        self._licences: dict[str, str] = {}
         self._digests: dict[tuple[str, int, int], str] = {}
         self._models: dict[tuple[str, str, float | None, str | None], LoadedModel] = {}
 
@@ -83,7 +86,9 @@ class RecipeFiles:
         if reference.startswith(PACKAGED_PREFIX):
             from fullwell.assets import packaged_model  # noqa: PLC0415 - an extra
 
-            return packaged_model(reference, field_path=path).path
+            packaged = packaged_model(reference, field_path=path)
+            self._licences[reference] = f"{packaged.licence} ({packaged.source})"
+            return packaged.path
         if self._base_dir is None:
             fail(path, f"is {reference!r}, but this recipe has no folder; load it from a file, or use an asset.", reference)
         file = self._base_dir / reference
@@ -103,6 +108,21 @@ class RecipeFiles:
         if expected and digest != expected:
             fail(path, f"is {reference!r}, whose SHA-256 is {digest}; files says {expected}. It was changed.", reference)
         return digest
+
+    def licence(self, reference: str) -> str | None:
+        """Return the licence and source of a file that was found in a package or an asset store; None for the user's own."""
+        return self._licences.get(reference)
+
+    def companions(self, reference: str, file: Path, model: LoadedModel) -> dict[str, str]:
+        """Return {reference: SHA-256} of the other files that the model at `reference` was made of."""
+        prefix, colon, inner = reference.rpartition(":")
+        folder = posixpath.dirname(inner)
+        found: dict[str, str] = {}
+        for other in model.references:
+            relative = Path(os.path.relpath(other, file.parent)).as_posix()
+            name = prefix + colon + posixpath.normpath(posixpath.join(folder, relative))
+            found[name] = self._digest(other, name, "files")
+        return found
 
     def _root_of(self, file: Path) -> Path | None:
         """Return the folder that a file's own references must stay within; None leaves it to the reader of models."""
@@ -140,9 +160,24 @@ class Context:
     used_files: dict[str, str] = field(default_factory=dict)
     materials: dict[str, tuple[Material, Emission | None]] = field(default_factory=dict)
     """By their canonical text: equal materials become one, which lets the renderer share them."""
+    _grouped: dict[str, list[str]] = field(default_factory=dict)
     upsampled: dict[tuple[float, float, float], Spectrum] = field(default_factory=dict)
 
     def warn(self, sentence: str) -> None:
         """Note a sentence for the manifest, once."""
         if sentence not in self.warnings:
             self.warnings.append(sentence)
+
+    def warn_of(self, path: str, sentence: str) -> None:
+        """Note "<path> <sentence>"; the same sentence about other fields becomes one note that counts them."""
+        paths = self._grouped.setdefault(sentence, [])
+        if path not in paths:
+            paths.append(path)
+
+    def all_warnings(self) -> tuple[str, ...]:
+        """Return every note."""
+        grouped = (
+            f"{paths[0]}{f' (and {len(paths) - 1} more)' if len(paths) > 1 else ''} {sentence}"
+            for sentence, paths in self._grouped.items()
+        )
+        return (*self.warnings, *grouped)

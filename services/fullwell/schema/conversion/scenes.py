@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
@@ -102,7 +102,14 @@ def _object(document: ObjectDocument, named: Mapping[str, Any], path: str, conte
         surfaces = [_surface_of(item, f"{path}.parts[{number}]") for number, item in enumerate(document.parts)]
     parts = tuple(part for surface in surfaces for part in _parts(surface, named, context))
     to_world = transform_of(document.transform, f"{path}.transform")
-    return SceneObject(document.id, document.semantic_class, parts, to_world, tuple(document.licences))
+    licences = (*document.licences, *_model_licences(surfaces, context))
+    return SceneObject(document.id, document.semantic_class, parts, to_world, tuple(dict.fromkeys(licences)))
+
+
+def _model_licences(surfaces: Iterable[_Surface], context: Context) -> Iterator[str]:
+    for surface in surfaces:
+        if isinstance(surface.geometry, ModelGeometry) and (licence := context.files.licence(surface.geometry.file)):
+            yield licence
 
 
 def _surface_of(document: PartDocument, path: str) -> _Surface:
@@ -127,6 +134,7 @@ def _model_parts(surface: _Surface, geometry: ModelGeometry, named: Mapping[str,
     file, digest = context.files.find(geometry.file, file_path)
     context.used_files[geometry.file] = digest
     model = context.files.model(file, digest, unit_m=geometry.unit_m, up_axis=geometry.up_axis, path=file_path)
+    context.used_files |= context.files.companions(geometry.file, file, model)
     for warning in model.warnings:
         context.warn(f"{file_path}: {warning}")
     _check_patterns(surface, [part.name for part in model.parts])

@@ -49,10 +49,10 @@ def reflectance_of(given: Any, path: str, context: Context) -> Spectrum:
 
 def colour_of(rgb: tuple[float, float, float], path: str, context: Context) -> Spectrum:
     """Return the upsampled reflectance of an sRGB colour, and warn that it is one."""
-    note = f"{path} is an sRGB colour: its spectrum is made up, right for the eye under daylight only."
+    note = "is an sRGB colour: its spectrum is made up, right for the eye under daylight only."
     if context.grid.edges_nm[-1] > 780.0:
         note += " Beyond 780 nm it means nothing."
-    context.warn(note)
+    context.warn_of(path, note)
     if rgb not in context.upsampled:
         with located(path):
             context.upsampled[rgb] = reflectance_from_srgb(rgb, path)
