@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -190,7 +191,7 @@ def _plan_passes(samples_per_pixel: int) -> tuple[int, int]:
     if samples_per_pixel == 1:
         return 1, 1
     wanted_passes = 4 if samples_per_pixel >= 32 else 2
-    per_pass = min(_MAX_PASS_SAMPLES, -(-samples_per_pixel // wanted_passes))
+    per_pass = _stratified(min(_MAX_PASS_SAMPLES, -(-samples_per_pixel // wanted_passes)))
     return -(-samples_per_pixel // per_pass), per_pass
 
 
@@ -213,6 +214,12 @@ class _Launch:
     def lanes(self) -> int:
         """Number of camera rays."""
         return self.pixels * self.per_pass
+
+
+def _stratified(samples: int) -> int:
+    """Return the next number of samples that fills a near-square grid of strata, as the sampler wants it."""
+    columns = round(math.sqrt(samples))
+    return columns * -(-samples // columns)
 
 
 def _render_wavefront(task: _Task, report: _Reporter) -> _Film:
