@@ -20,9 +20,9 @@ app = typer.Typer(
 
 
 def _register() -> None:
-    from fullwell.cli import doctor, local, service  # noqa: PLC0415 - commands import their modules late
+    from fullwell.cli import doctor, local, measure, service  # noqa: PLC0415 - commands import their modules late
 
-    for module in (local, service, doctor):
+    for module in (local, measure, service, doctor):
         module.register(app)
 
 
