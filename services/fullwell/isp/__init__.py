@@ -1,6 +1,7 @@
 """From raw digital numbers to a picture: one module per step, `model` holds their order."""
 
+from fullwell.isp.calibration import ColourCalibration, calibrate
 from fullwell.isp.model import DisplayImage, develop
-from fullwell.isp.parameters import IspSettings
+from fullwell.isp.parameters import ColourMatrixFit, IspSettings, ToneCurve
 
-__all__ = ["DisplayImage", "IspSettings", "develop"]
+__all__ = ["ColourCalibration", "ColourMatrixFit", "DisplayImage", "IspSettings", "ToneCurve", "calibrate", "develop"]
