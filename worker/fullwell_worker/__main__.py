@@ -38,7 +38,7 @@ def _run(settings: Settings, name: str) -> int:
     os.environ.setdefault("REMAP_SIGTERM", "SIGQUIT")
     from fullwell.jobs.database import Database  # noqa: PLC0415
     from fullwell.jobs.logs import configure_logs  # noqa: PLC0415
-    from fullwell_worker.application import make_worker, wait_for_schema  # noqa: PLC0415
+    from fullwell_worker.application import QueueWorker, wait_for_schema  # noqa: PLC0415
     from fullwell_worker.materials import remove_leftovers  # noqa: PLC0415
 
     broker_url, settings = _connected(settings)
@@ -47,11 +47,7 @@ def _run(settings: Settings, name: str) -> int:
     wait_for_schema(database)
     database.close()
     remove_leftovers()
-    application = make_worker(settings, broker_url=broker_url, name=name)
-    application.worker_main(
-        ["worker", "--pool=prefork", "--concurrency=1", "--loglevel=INFO", "--without-gossip", "--without-mingle"]
-        + [f"--hostname={name or 'worker'}-{os.getpid()}@%h"]
-    )
+    QueueWorker(settings, broker_url=broker_url, name=name).run()
     return 0
 
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import mmap
 import os
 import socket
 import subprocess
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import structlog
 from billiard.exceptions import WorkerLostError
 from celery import Celery, Task, signals
+from celery.apps.worker import Worker
 from celery.exceptions import Reject
 from celery.worker.request import Request
 
@@ -26,9 +30,11 @@ from fullwell_worker import health
 from fullwell_worker.execution import CurrentJob, WorkerContext, run_frames
 from fullwell_worker.loss import Loss, record_loss_in_a_process
 
-__all__ = ["make_worker", "wait_for_schema"]
+__all__ = ["QueueWorker", "wait_for_schema"]
 
 BEAT_S = 5.0
+LEAVING_POLL_S = 0.1
+SHUT_DOWN = "the worker was shut down"
 SCHEMA_PATIENCE_S = 60.0
 log = structlog.get_logger("fullwell.worker")
 
@@ -45,9 +51,35 @@ class _Processes:
     def __init__(self, settings: Settings, name: str) -> None:
         self.settings = settings
         self.name = name
-        self.shutting_down = threading.Event()
+        # Two bytes that the main process and its children share: whether the worker was asked to end, and whether a
+        # child runs a frame.
+        self._flags = mmap.mmap(-1, 2)
         self._pid = 0
         self._context: WorkerContext | None = None
+
+    @property
+    def leaving(self) -> bool:
+        """Whether the worker was asked to end."""
+        return self._flags[0] != 0
+
+    def leave(self) -> None:
+        self._flags[0] = 1
+
+    @property
+    def busy(self) -> bool:
+        """Whether a child runs a frame."""
+        return self._flags[1] != 0
+
+    def rest(self) -> None:
+        self._flags[1] = 0
+
+    @contextmanager
+    def working(self) -> Iterator[None]:
+        self._flags[1] = 1
+        try:
+            yield
+        finally:
+            self._flags[1] = 0
 
     def context(self) -> WorkerContext:
         if self._context is None or self._pid != os.getpid():
@@ -58,14 +90,49 @@ class _Processes:
         return self._context
 
 
-def make_worker(settings: Settings, *, broker_url: str, name: str = "") -> Celery:
-    """Return the Celery application with its task and its handlers; run it with ``worker_main``."""
-    # A worker's name is unique: frames are given back by it.
-    processes = _Processes(settings, f"{name or 'worker'}@{socket.gethostname()}:{os.getpid()}")
-    application = celery_application(settings, broker_url)
-    _add_task(application, processes)
-    _add_handlers(processes)
-    return application
+class QueueWorker:
+    """One worker: its main process, which never renders, and its one child, which does."""
+
+    def __init__(self, settings: Settings, *, broker_url: str, name: str = "") -> None:
+        self._label = name or "worker"
+        # A worker's name is unique: frames are given back by it.
+        self._processes = _Processes(settings, f"{self._label}@{socket.gethostname()}:{os.getpid()}")
+        self.application = celery_application(settings, broker_url)
+        self.application.Worker = self.application.subclass_with_self(_worker_class(self._processes))
+        _add_task(self.application, self._processes)
+        _add_handlers(self._processes)
+
+    def run(self) -> None:
+        """Take frames until the process is asked to end."""
+        options = ["--pool=prefork", "--concurrency=1", "--loglevel=INFO", "--without-gossip", "--without-mingle"]
+        try:
+            self.application.worker_main(["worker", *options, f"--hostname={self._label}-{os.getpid()}@%h"])
+        finally:
+            self._sign_off()
+
+    def _sign_off(self) -> None:
+        """Give back what the last child had; it has ended by now, so the database may be opened here."""
+        self._processes.leave()
+        health.remove(self._processes.settings.health_file)
+        try:
+            repository = self._processes.context().repository
+            repository.release_worker(self._processes.name, cause=SHUT_DOWN)
+            repository.remove_worker(self._processes.name)
+        except FullwellError as error:
+            log.warning("not signed off", cause=str(error))
+
+
+def _worker_class(processes: _Processes) -> type[Worker]:
+    class FrameWorker(Worker):  # type: ignore[misc]
+        """Celery's worker, whose soft shutdown ends as soon as the running frame has, not when its time is up."""
+
+        def wait_for_soft_shutdown(self) -> None:
+            processes.leave()
+            deadline = time.monotonic() + processes.settings.soft_shutdown_s
+            while processes.busy and time.monotonic() < deadline:
+                time.sleep(LEAVING_POLL_S)
+
+    return FrameWorker
 
 
 def _add_task(application: Celery, processes: _Processes) -> None:
@@ -92,7 +159,9 @@ def _add_task(application: Celery, processes: _Processes) -> None:
     def render_frames(self: Any, job_id: str, numbers: list[int]) -> None:
         """Run frames of a job; the database says which of them still need it."""
         try:
-            run_frames(processes.context(), str(job_id), [int(number) for number in numbers])
+            with processes.working():
+                frames = [int(number) for number in numbers]
+                run_frames(processes.context(), str(job_id), frames, should_stop=lambda: processes.leaving)
         except ServiceError as error:
             # The database is away: the message goes back to the broker, after a pause, and comes again.
             log.warning("message handed back", job=job_id, cause=str(error))
@@ -103,7 +172,7 @@ def _add_task(application: Celery, processes: _Processes) -> None:
 
 
 def _record_loss(processes: _Processes, request: Any, cause: str) -> None:
-    if processes.shutting_down.is_set() or getattr(request, "_already_cancelled", False):
+    if processes.leaving or getattr(request, "_already_cancelled", False):
         return  # an orderly end: the frames are given back when the last child has ended
     try:
         job_id, numbers = request.args
@@ -120,6 +189,7 @@ def _add_handlers(processes: _Processes) -> None:
     @signals.worker_process_init.connect(weak=False)  # type: ignore[untyped-decorator]
     def _child_started(**_: Any) -> None:
         die_with_parent(parent)
+        processes.rest()  # the child before this one may have died at work
         threading.Thread(target=_beat_forever, args=(processes,), name="worker-beat", daemon=True).start()
 
     @signals.heartbeat_sent.connect(weak=False)  # type: ignore[untyped-decorator]
@@ -130,30 +200,23 @@ def _add_handlers(processes: _Processes) -> None:
     def _ready(**_: Any) -> None:
         health.beat(file)
 
-    @signals.worker_shutting_down.connect(weak=False)  # type: ignore[untyped-decorator]
-    def _leaving(**_: Any) -> None:
-        processes.shutting_down.set()
-
-    @signals.worker_shutdown.connect(weak=False)  # type: ignore[untyped-decorator]
-    def _left(**_: Any) -> None:
-        processes.shutting_down.set()
-        health.remove(file)
-        try:
-            repository = processes.context().repository
-            repository.release_worker(processes.name, cause="the worker was shut down")
-            repository.remove_worker(processes.name)
-        except FullwellError as error:
-            log.warning("not signed off", cause=str(error))
-
 
 def _beat_forever(processes: _Processes) -> None:
+    """Give signs of life, and pass on that the worker is leaving; runs in the child."""
     repository = JobRepository(Database(processes.settings.database))
+    next_beat = 0.0
+    told = False
     while True:
         try:
-            repository.beat_worker(processes.name)
+            if time.monotonic() >= next_beat:
+                repository.beat_worker(processes.name)
+                next_beat = time.monotonic() + BEAT_S
+            if processes.leaving and not told:
+                repository.worker_leaves(processes.name)
+                told = True
         except FullwellError as error:
             log.warning("no sign of life sent", cause=str(error))
-        time.sleep(BEAT_S)
+        time.sleep(LEAVING_POLL_S)
 
 
 def wait_for_schema(database: Database) -> None:

@@ -190,9 +190,16 @@ class Heart:
                 self._stop_asked.set()
 
 
-def run_frames(context: WorkerContext, job_id: str, numbers: list[int]) -> None:
-    """Run those of the frames that still need it."""
+def run_frames(
+    context: WorkerContext, job_id: str, numbers: list[int], *, should_stop: Callable[[], bool] = lambda: False
+) -> None:
+    """Run those of the frames that still need it; start no further one when `should_stop` says so.
+
+    Frames that are left out come again: their message is handed back, and the database knows them as queued.
+    """
     for number in numbers:
+        if should_stop():
+            return
         lease = context.repository.acquire(
             job_id,
             number,

@@ -95,10 +95,11 @@ class AttemptRow(Base):
 
 
 class WorkerRow(Base):
-    """A worker and when it last gave a sign of life."""
+    """A worker and when it last gave a sign of life; `leaving_at` is set when it was asked to end."""
 
     __tablename__ = "workers"
 
     name: Mapped[str] = mapped_column(String(255), primary_key=True)
     started_at: Mapped[float] = mapped_column(Float)
     seen_at: Mapped[float] = mapped_column(Float)
+    leaving_at: Mapped[float | None] = mapped_column(Float)

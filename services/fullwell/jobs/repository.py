@@ -44,6 +44,7 @@ __all__ = ["JobRepository"]
 
 MAX_CAUSE_CHARACTERS = 4000
 INSERT_ROWS = 5000
+WORKER_LOST = "worker_lost"
 
 
 def _new_job_id() -> str:
@@ -360,18 +361,35 @@ class JobRepository:
         return losses
 
     def lose(self, job_id: str, numbers: Iterable[int], *, worker: str, cause: str, rule: RetryRule) -> list[Loss]:
-        """Take back those of the frames that `worker` runs: the process that ran them has died, `cause` says how."""
+        """Take back those of the frames that `worker` runs: the process that ran them has died, `cause` says how.
+
+        A frame that was taken back before, because its process was found dead, gets this better cause.
+        """
         losses = []
         with self._database.writing() as session:
             job = self._locked_job(session, job_id)
             now = self._database.now(session)
             for number in numbers:
                 row = session.get(FrameRow, (job_id, number))
-                if row is None or row.state != FrameState.RUNNING or row.worker != worker[:255]:
+                if row is None or row.worker != worker[:255]:
+                    continue
+                if row.state != FrameState.RUNNING:
+                    self._explain_loss(session, row, cause)
                     continue
                 losses.append(Loss(job_id, number, row.attempt, cause))
                 self._lose(session, job, row, cause=cause, rule=rule, now=now)
         return losses
+
+    def _explain_loss(self, session: Session, row: FrameRow, cause: str) -> None:
+        changed = session.execute(
+            update(AttemptRow)
+            .where(AttemptRow.job_id == row.job_id, AttemptRow.number == row.number, AttemptRow.attempt == row.attempt)
+            .where(AttemptRow.outcome == "lost")
+            .values(cause=cause[:MAX_CAUSE_CHARACTERS])
+            .returning(AttemptRow.id)
+        ).all()
+        if changed and row.error_code == WORKER_LOST and row.state == FrameState.QUEUED:
+            row.error = cause[:MAX_CAUSE_CHARACTERS]
 
     def reap(self, rule: RetryRule) -> list[Loss]:
         """Take back every running frame whose lease has expired or whose holder is certainly dead."""
@@ -456,6 +474,16 @@ class JobRepository:
                 session.add(WorkerRow(name=name[:255], started_at=now, seen_at=now))
             else:
                 row.seen_at = now
+
+    def worker_leaves(self, name: str) -> None:
+        """Record that a worker was asked to end: a frame that it cannot finish in time is given back without a strike."""
+        with self._database.writing() as session:
+            now = self._database.now(session)
+            row = session.get(WorkerRow, name[:255])
+            if row is None:
+                session.add(WorkerRow(name=name[:255], started_at=now, seen_at=now, leaving_at=now))
+            else:
+                row.leaving_at = now
 
     def remove_worker(self, name: str) -> None:
         """Forget a worker that has ended."""
@@ -544,7 +572,11 @@ class JobRepository:
         return self._record(session, row)
 
     def _lose(self, session: Session, job: JobRow, row: FrameRow, *, cause: str, rule: RetryRule, now: float) -> None:
-        self._strike(session, job, row, outcome="lost", cause=cause, code="worker_lost", retryable=True, rule=rule, now=now)
+        worker = session.get(WorkerRow, row.worker or "")
+        if worker is not None and worker.leaving_at is not None:
+            self._requeue(session, job, row, outcome="released", cause="the worker was shut down", now=now)
+            return
+        self._strike(session, job, row, outcome="lost", cause=cause, code=WORKER_LOST, retryable=True, rule=rule, now=now)
 
     def _strike(
         self,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import subprocess
 import sys
 import threading
@@ -85,26 +84,27 @@ def test_many_threads_lease_a_frame_once(repository: JobRepository) -> None:
     assert len(leases) == 8
 
 
-def _finish_every_other(path: str, job_id: str, start: int) -> None:
-    database = Database(path)
-    repository = JobRepository(database)
-    for number in range(start, 40, 2):
-        lease = repository.acquire(job_id, number, worker=f"p{start}", holder=ELSEWHERE, lease_s=30, rule=RULE)
-        assert lease is not None
-        repository.complete(lease)
-    database.close()
+FINISH_EVERY_OTHER = """
+import sys
+from fullwell.jobs.database import Database
+from fullwell.jobs.processes import current_process
+from fullwell.jobs.records import RetryRule
+from fullwell.jobs.repository import JobRepository
+
+url, job_id, start = sys.argv[1], sys.argv[2], int(sys.argv[3])
+repository = JobRepository(Database(url))
+for number in range(start, 40, 2):
+    lease = repository.acquire(job_id, number, worker=str(start), holder=current_process(), lease_s=30, rule=RetryRule())
+    assert repository.complete(lease)
+"""
 
 
 def test_two_processes_finish_a_job_together(repository: JobRepository, database: Database) -> None:
     job = new_job(repository, 40)
-    context = multiprocessing.get_context("spawn")
     url = f"sqlite:///{database.engine.url.database}"
-    processes = [context.Process(target=_finish_every_other, args=(url, job.id, start)) for start in (0, 1)]
-    for process in processes:
-        process.start()
-    for process in processes:
-        process.join()
-        assert process.exitcode == 0
+    commands = [[sys.executable, "-c", FINISH_EVERY_OTHER, url, job.id, str(start)] for start in (0, 1)]
+    processes = [subprocess.Popen(command) for command in commands]
+    assert [process.wait(60) for process in processes] == [0, 0]
     assert repository.job(job.id).state == JobState.DONE
 
 
@@ -156,6 +156,17 @@ def test_the_frame_of_a_dead_process_is_taken_back_before_its_lease_ends(reposit
     assert repository.frame(job.id, 0).state == FrameState.QUEUED
 
 
+def test_a_better_cause_of_a_loss_replaces_the_first(repository: JobRepository) -> None:
+    job = new_job(repository, 1)
+    take(repository, job, lease_s=-1.0)
+    repository.reap(RULE)
+    assert repository.lose(job.id, [0], worker="w1", cause="killed by signal 9", rule=RULE) == []
+    assert repository.frame(job.id, 0).error == "killed by signal 9"
+    assert [a.cause for a in repository.attempts(job.id, 0)] == ["killed by signal 9"]
+    assert repository.lose(job.id, [0], worker="another", cause="?", rule=RULE) == []
+    assert repository.frame(job.id, 0).error == "killed by signal 9"
+
+
 def test_a_frame_that_loses_its_worker_three_times_is_failed_with_the_cause(repository: JobRepository) -> None:
     job = new_job(repository, 1)
     for attempt in (1, 2, 3):
@@ -190,6 +201,16 @@ def test_a_frame_given_back_at_shutdown_gets_no_strike(repository: JobRepository
         assert len(repository.release_worker("w1", cause="worker shut down")) == 1
     assert repository.frame(job.id, 0).state == FrameState.QUEUED
     assert repository.frame(job.id, 0).attempt == 5
+
+
+def test_what_a_leaving_worker_loses_is_no_strike(repository: JobRepository) -> None:
+    job = new_job(repository, 1)
+    repository.worker_leaves("w1")
+    for _ in range(4):
+        take(repository, job, lease_s=-1.0)
+        repository.reap(RULE)
+    assert [a.outcome for a in repository.attempts(job.id, 0)] == ["released"] * 4
+    assert repository.frame(job.id, 0).state == FrameState.QUEUED
 
 
 def test_cancelling_stops_what_waits_and_asks_what_runs(repository: JobRepository) -> None:
