@@ -11,7 +11,7 @@ from fullwell.core.errors import FieldError, ShapeError
 from fullwell.radiometry.grid import WavelengthGrid
 from fullwell.radiometry.spectrum import Spectrum
 
-__all__ = ["OpticalImage", "RawImage"]
+__all__ = ["CaptureRecord", "OpticalImage", "RawImage"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,6 +69,34 @@ class OpticalImage:
         return self.cols * self.sample_pitch_m
 
 
+@dataclass(frozen=True, slots=True)
+class CaptureRecord:
+    """One of the captures that a raw image was combined from; for the manifest.
+
+    Attributes
+    ----------
+    photodiode, readout
+        Names of the photodiode and of its readout (conversion gain).
+    start_s, exposure_time_s
+        Start of the first row's integration after that of the first capture, and integration time [s].
+    sensitivity_ratio
+        Electrons of this capture per electron of the image's reference capture.
+    electrons_per_dn
+        Of this capture's own converter [e-/DN].
+    saturated_fraction, used_fraction
+        Fractions of the pixels that were saturated in this capture, and to whose value it contributed.
+    """
+
+    photodiode: str
+    readout: str
+    start_s: float
+    exposure_time_s: float
+    sensitivity_ratio: float
+    electrons_per_dn: float
+    saturated_fraction: float
+    used_fraction: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class RawImage:
     """Digital numbers as the sensor delivers them, with what an image processor must know about the sensor.
@@ -76,7 +104,7 @@ class RawImage:
     Attributes
     ----------
     dn
-        (rows, cols) uint16 [DN].
+        (rows, cols) [DN]: uint16, or uint32 where captures were combined to more than 16 bits. Linear in the light.
     pattern
         Rows of channel names, repeated over the image; ``pattern[0][0]`` is the top-left pixel.
     channels
@@ -86,16 +114,26 @@ class RawImage:
     black_level_dn, white_level_dn
         DN of a pixel without light and without noise (not rounded), and of a saturated pixel.
     exposure_time_s
-        Integration time [s].
+        Integration time [s]; of a combined image that of its reference capture.
     sensor_name, adc_bits
-        Of the sensor.
+        Of the sensor; of a combined image the bits of `dn`.
     saturated_fraction
         Fraction of the pixels that filled their well or reached the ADC's full scale, in [0, 1].
     mean_electrons
-        (rows, cols) float32 [e-], noise-free photo and dark electrons before the well limits them; None where not asked for.
+        (rows, cols) float32 [e-], noise-free photo and dark electrons before the well limits them, of the reference capture;
+        None where not asked for.
+    line_time_s
+        Delay of each row's start after the row above it [s]; 0 is a global shutter.
+    electrons_per_dn
+        Electrons at the pixel for one digital number [e-/DN]; 0 where not known.
+    channel_exposure_time_s
+        (name, integration time [s]) where the channels were exposed differently; empty otherwise. `dn` is what each pixel
+        would have had at `exposure_time_s`.
+    captures
+        What a combined image was made of; empty for a single capture.
     """
 
-    dn: NDArray[np.uint16]
+    dn: NDArray[np.uint16] | NDArray[np.uint32]
     pattern: tuple[tuple[str, ...], ...]
     channels: tuple[tuple[str, Spectrum], ...]
     grid: WavelengthGrid
@@ -106,6 +144,10 @@ class RawImage:
     adc_bits: int
     saturated_fraction: float
     mean_electrons: NDArray[np.float32] | None = None
+    line_time_s: float = 0.0
+    electrons_per_dn: float = 0.0
+    channel_exposure_time_s: tuple[tuple[str, float], ...] = ()
+    captures: tuple[CaptureRecord, ...] = ()
 
     def __post_init__(self) -> None:
         if self.dn.ndim != 2:
@@ -129,3 +171,13 @@ class RawImage:
     def cols(self) -> int:
         """Number of columns."""
         return int(self.dn.shape[1])
+
+    @property
+    def row_start_s(self) -> NDArray[np.float64]:
+        """(rows,) start of each row's integration after that of the first row [s]."""
+        return np.asarray(np.arange(self.rows) * self.line_time_s, dtype=np.float64)
+
+    @property
+    def row_middle_s(self) -> NDArray[np.float64]:
+        """(rows,) middle of each row's integration after the start of the first row's [s]."""
+        return np.asarray(self.row_start_s + 0.5 * self.exposure_time_s)

@@ -2,13 +2,46 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 from numpy.typing import NDArray
 
+from fullwell.core.errors import FieldError, unknown_name_message
 from fullwell.sensor.parameters import ColorFilterArray
 from fullwell.sensor.sampling import PixelSampling
 
-__all__ = ["channel_index_map", "mosaic"]
+__all__ = ["PATTERN_NAMES", "cfa_pattern", "channel_index_map", "mosaic"]
+
+_PATTERNS: Final = {
+    "rggb": "R G/G B",
+    "grbg": "G R/B G",
+    "gbrg": "G B/R G",
+    "bggr": "B G/G R",
+    "mono": "W",
+    "rccc": "R C/C C",
+    "rccb": "R C/C B",
+    "ryycy": "R Y/Y Cy",
+    "rgbw": "R G/B W",
+    "rgb-nir": "R G/NIR B",
+    "quad-rggb": "R R G G/R R G G/G G B B/G G B B",
+    "quad-ryycy": "R R Y Y/R R Y Y/Y Y Cy Cy/Y Y Cy Cy",
+}
+"""Rows divided by /; C and W are clear pixels, Y yellow, Cy cyan."""
+
+PATTERN_NAMES: Final = tuple(sorted(_PATTERNS))
+"""Patterns that have names."""
+
+
+def cfa_pattern(name: str, *, path: str = "pattern") -> tuple[tuple[str, ...], ...]:
+    """Return the rows of channel names of a named pattern; case does not matter.
+
+    Raises FieldError, naming the nearest known pattern, where `name` is not known; `path` is the field that asked.
+    """
+    text = _PATTERNS.get(name.casefold())
+    if text is None:
+        raise FieldError(unknown_name_message("filter pattern", name, _PATTERNS), path=path, value=name)
+    return tuple(tuple(row.split(" ")) for row in text.split("/"))
 
 
 def channel_index_map(cfa: ColorFilterArray, *, rows: int, cols: int) -> NDArray[np.intp]:

@@ -2,22 +2,38 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import Final, Literal, TypeAlias
+from typing import Final, Literal, get_args
 
 import numpy as np
 
 from fullwell.core.errors import FieldError, unknown_name_message
 from fullwell.radiometry.spectrum import Spectrum
+from fullwell.sensor.checks import check_fraction, check_kernel, check_not_negative, check_positive, refusal
+from fullwell.sensor.dark_current import DEFAULT_LAW, DarkCurrentLaw
+from fullwell.sensor.exposures import (
+    AutoExposure,
+    BracketExposure,
+    BurstExposure,
+    ChannelExposure,
+    Combination,
+    Exposure,
+    FixedExposure,
+)
+from fullwell.sensor.microlens import PixelFalloff
+from fullwell.sensor.photodiodes import Photodiode
 
 __all__ = [
     "MAX_ADC_BITS",
     "MAX_WELL_CAPACITY_E",
     "AutoExposure",
+    "BracketExposure",
+    "BurstExposure",
+    "ChannelExposure",
     "ColorFilterArray",
     "Exposure",
     "FixedExposure",
+    "ReadoutSampling",
     "SensorModel",
 ]
 
@@ -28,8 +44,7 @@ MAX_WELL_CAPACITY_E: Final = 1e9
 """Poisson numbers are drawn exactly up to here and beyond; no photodiode comes near it."""
 
 
-def _refuse(path: str, value: object, legal: str) -> FieldError:
-    return FieldError(f"{path} is {value}; must be {legal}. Set {path} of the sensor.", path=path, value=value)
+ReadoutSampling = Literal["single", "correlated_double"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,22 +64,49 @@ class ColorFilterArray:
 
     def __post_init__(self) -> None:
         if not self.pattern or not self.pattern[0] or len({len(row) for row in self.pattern}) != 1:
-            raise _refuse("pattern", self.pattern, "a rectangle of channel names, at least 1 x 1")
+            raise refusal("pattern", self.pattern, "a rectangle of channel names, at least 1 x 1")
         names = [name for name, _ in self.channels]
         if len(set(names)) != len(names):
-            raise _refuse("channels", names, "named differently from one another")
+            raise refusal("channels", names, "named differently from one another")
         for name in (name for row in self.pattern for name in row):
             if name not in names:
                 raise FieldError(unknown_name_message("channel", name, names), path="pattern", value=name)
         for name, efficiency in self.channels:
             low, high = float(np.min(efficiency.values)), float(np.max(efficiency.values))
             if low < 0 or high > 1:
-                raise _refuse(f"channels.{name}", f"{low} to {high}", "a quantum efficiency within 0 to 1")
+                raise refusal(f"channels.{name}", f"{low} to {high}", "a quantum efficiency within 0 to 1")
 
     @property
     def channel_names(self) -> tuple[str, ...]:
         """Names of the channels, in their order."""
         return tuple(name for name, _ in self.channels)
+
+
+_COUNTS = ("rows", "cols")
+_POSITIVE = (
+    "pixel_pitch_m",
+    "well_capacity_e",
+    "conversion_gain_v_per_e",
+    "voltage_swing_v",
+    "analog_gain_ratio",
+    "temperature_k",
+    "dark_reference_temperature_k",
+)
+_NOT_NEGATIVE = (
+    "dark_current_e_per_s",
+    "read_noise_e",
+    "dsnu_v",
+    "prnu_fraction",
+    "analog_offset_v",
+    "dcnu_fraction",
+    "hot_pixel_dark_current_e_per_s",
+    "reset_noise_e",
+    "column_offset_v",
+    "row_offset_v",
+    "column_gain_fraction",
+    "row_noise_v",
+    "line_time_s",
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,6 +135,41 @@ class SensorModel:
         Amplification between pixel and ADC (> 1 brightens); `analog_offset_v` is added after it [V].
     serial
         Seeds the fixed pattern: same serial, same pattern.
+    array_rows, array_cols
+        Pixels of the whole chip where only its middle is read: the fixed pattern is a cut-out of the chip's. 0: as many as are
+        read.
+    photodetector_offset_m
+        (down, right) of the photodetector's centre from the pixel's [m]; it must stay within the pixel.
+    microlens
+        Relative illumination of the pixels over the field; None is 1.
+    crosstalk_kernel
+        3 x 3 shares of a pixel's electrons that it and its neighbours collect (`fullwell.sensor.crosstalk`); None is no
+        crosstalk.
+    temperature_k, dark_reference_temperature_k, dark_current_law
+        `dark_current_e_per_s` holds at the reference temperature and follows the law to `temperature_k` [K].
+    dcnu_fraction
+        Standard deviation over the pixels of the dark current over its mean.
+    hot_pixel_fraction, hot_pixel_dark_current_e_per_s
+        Share of the pixels that are hot, and the mean of their extra dark current at the reference temperature [e-/s], which
+        is exponentially distributed.
+    reset_noise_e
+        Standard deviation of the reset (kTC) noise [e-].
+    readout_sampling
+        "single": a pixel is read once. "correlated_double": twice, after the reset and after the exposure, and the difference
+        is taken: reset noise and fixed offsets cancel, `read_noise_e` and `row_noise_v` count twice.
+    column_offset_v, row_offset_v
+        Standard deviations of the fixed offsets of columns and rows, before the analog gain [V].
+    column_gain_fraction
+        Standard deviation of the fixed relative gain of the columns.
+    row_noise_v
+        Standard deviation of the noise that all pixels of a row share, new at each readout, before the analog gain [V].
+    line_time_s
+        Delay from row to row of a rolling shutter [s]; 0 is a global shutter.
+    photodiodes
+        Photodiodes and their readouts where there are several, the most sensitive first; they replace `fill_factor`,
+        `well_capacity_e`, `conversion_gain_v_per_e` and `read_noise_e`, which then only describe the reference. Empty: one.
+    combination
+        How the captures of several photodiodes or readouts become one image; "weighted" or "select" (`BracketExposure`).
 
     Raises
     ------
@@ -117,75 +194,68 @@ class SensorModel:
     analog_offset_v: float
     adc_bits: int
     serial: int = 0
+    array_rows: int = 0
+    array_cols: int = 0
+    photodetector_offset_m: tuple[float, float] = (0.0, 0.0)
+    microlens: PixelFalloff | None = None
+    crosstalk_kernel: tuple[tuple[float, ...], ...] | None = None
+    temperature_k: float = 298.15
+    dark_reference_temperature_k: float = 298.15
+    dark_current_law: DarkCurrentLaw = DEFAULT_LAW
+    dcnu_fraction: float = 0.0
+    hot_pixel_fraction: float = 0.0
+    hot_pixel_dark_current_e_per_s: float = 0.0
+    reset_noise_e: float = 0.0
+    readout_sampling: ReadoutSampling = "single"
+    column_offset_v: float = 0.0
+    row_offset_v: float = 0.0
+    column_gain_fraction: float = 0.0
+    row_noise_v: float = 0.0
+    line_time_s: float = 0.0
+    photodiodes: tuple[Photodiode, ...] = ()
+    combination: Combination = "weighted"
 
     def __post_init__(self) -> None:
-        for path in ("rows", "cols"):
+        for path in _COUNTS:
             if not getattr(self, path) >= 1:
-                raise _refuse(path, getattr(self, path), "at least 1")
-        for path in ("pixel_pitch_m", "well_capacity_e", "conversion_gain_v_per_e", "voltage_swing_v", "analog_gain_ratio"):
-            if not 0 < getattr(self, path) < math.inf:
-                raise _refuse(path, getattr(self, path), "> 0 and finite")
-        for path in ("dark_current_e_per_s", "read_noise_e", "dsnu_v", "prnu_fraction", "analog_offset_v"):
-            if not 0 <= getattr(self, path) < math.inf:
-                raise _refuse(path, getattr(self, path), ">= 0 and finite")
-        if not 0 < self.fill_factor <= 1:
-            raise _refuse("fill_factor", self.fill_factor, "> 0 and at most 1")
+                raise refusal(path, getattr(self, path), "at least 1")
+        for path in _POSITIVE:
+            check_positive(path, getattr(self, path))
+        for path in _NOT_NEGATIVE:
+            check_not_negative(path, getattr(self, path))
+        for path in ("array_rows", "array_cols"):
+            if not getattr(self, path) >= 0:
+                raise refusal(path, getattr(self, path), "at least 0")
+        check_positive("fill_factor", self.fill_factor)
+        for path in ("fill_factor", "hot_pixel_fraction"):
+            check_fraction(path, getattr(self, path))
         if not self.well_capacity_e <= MAX_WELL_CAPACITY_E:
-            raise _refuse("well_capacity_e", self.well_capacity_e, f"at most {MAX_WELL_CAPACITY_E:g}")
+            raise refusal("well_capacity_e", self.well_capacity_e, f"at most {MAX_WELL_CAPACITY_E:g}")
         if not 1 <= self.adc_bits <= MAX_ADC_BITS:
-            raise _refuse("adc_bits", self.adc_bits, f"1 to {MAX_ADC_BITS}")
+            raise refusal("adc_bits", self.adc_bits, f"1 to {MAX_ADC_BITS}")
         if not self.analog_offset_v < self.voltage_swing_v:
-            raise _refuse("analog_offset_v", self.analog_offset_v, f"below voltage_swing_v = {self.voltage_swing_v}")
+            raise refusal("analog_offset_v", self.analog_offset_v, f"below voltage_swing_v = {self.voltage_swing_v}")
+        if self.crosstalk_kernel is not None:
+            check_kernel("crosstalk_kernel", self.crosstalk_kernel)
+        self._check_choices()
+        self._check_photodiodes()
 
+    def _check_choices(self) -> None:
+        for path, legal in (("readout_sampling", get_args(ReadoutSampling)), ("combination", get_args(Combination))):
+            if getattr(self, path) not in legal:
+                message = unknown_name_message(path.replace("_", " "), getattr(self, path), legal)
+                raise FieldError(message, path=path, value=getattr(self, path))
 
-@dataclass(frozen=True, slots=True)
-class FixedExposure:
-    """One exposure of `time_s` [s], > 0."""
-
-    time_s: float
-
-    def __post_init__(self) -> None:
-        if not 0 < self.time_s < math.inf:
-            raise FieldError(
-                f"time_s is {self.time_s}; must be > 0 and finite. Set exposure.time_s.", path="time_s", value=self.time_s
-            )
-
-
-@dataclass(frozen=True, slots=True)
-class AutoExposure:
-    """Exposure time found from the noise-free image.
-
-    "full": the brightest pixel reaches `level` of the saturation signal; "mean": the mean pixel does; "percentile": the
-    `percentile`-th one does. The saturation signal is the well, or what the ADC's full scale leaves of it after analog gain
-    and offset. The result is clipped to [min_time_s, max_time_s]; a black scene gets max_time_s.
-    """
-
-    method: Literal["full", "mean", "percentile"] = "percentile"
-    level: float = 0.7
-    percentile: float = 99.0
-    min_time_s: float = 1e-6
-    max_time_s: float = 1.0
-
-    def __post_init__(self) -> None:
-        if self.method not in ("full", "mean", "percentile"):
-            message = unknown_name_message("exposure method", self.method, ("full", "mean", "percentile"))
-            raise FieldError(message, path="method", value=self.method)
-        if not 0 < self.level <= 1:
-            raise FieldError(
-                f"level is {self.level}; must be > 0 and at most 1. Set exposure.level.", path="level", value=self.level
-            )
-        if not 0 <= self.percentile <= 100:
-            raise FieldError(
-                f"percentile is {self.percentile}; must be 0 to 100. Set exposure.percentile.",
-                path="percentile",
-                value=self.percentile,
-            )
-        if not 0 < self.min_time_s <= self.max_time_s < math.inf:
-            raise FieldError(
-                f"min_time_s is {self.min_time_s} and max_time_s {self.max_time_s}; must be 0 < min_time_s <= max_time_s.",
-                path="min_time_s",
-                value=self.min_time_s,
-            )
-
-
-Exposure: TypeAlias = FixedExposure | AutoExposure
+    def _check_photodiodes(self) -> None:
+        names = [photodiode.name for photodiode in self.photodiodes]
+        if len(set(names)) != len(names):
+            raise refusal("photodiodes", names, "named differently from one another")
+        places = [(photodiode.offset_m, photodiode.fill_factor) for photodiode in self.photodiodes]
+        for offset_m, fill_factor in places or [(None, self.fill_factor)]:
+            reach = max(abs(d) for d in offset_m or self.photodetector_offset_m) + 0.5 * self.pixel_pitch_m * fill_factor**0.5
+            if not reach <= 0.5 * self.pixel_pitch_m * (1 + 1e-9):
+                raise refusal(
+                    "photodetector_offset_m",
+                    offset_m or self.photodetector_offset_m,
+                    f"so small that a photodetector of fill factor {fill_factor:g} stays within the pixel",
+                )

@@ -2,16 +2,71 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
-from fullwell.core.errors import ShapeError
+from fullwell.core.errors import FieldError, ShapeError
 from fullwell.radiometry.grid import WavelengthGrid
+from fullwell.scene.images import OpticalImage
 from fullwell.sensor.parameters import ColorFilterArray
 
-__all__ = ["band_quantum_efficiency", "integrate_bands"]
+__all__ = ["ChannelCurrents", "band_quantum_efficiency", "channel_currents", "integrate_bands"]
 
 _SAMPLES_AT_A_TIME = 1 << 15
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ChannelCurrents:
+    """An optical image seen by each channel of a colour filter array: what all exposures and pixel sizes behind it share.
+
+    Attributes
+    ----------
+    electrons
+        (channels, rows, cols) [e- s^-1 m^-2], for a photodetector that had this channel everywhere.
+    cfa
+        The colour filter array whose channels they are.
+    grid, sample_pitch_m
+        Of the optical image.
+    """
+
+    electrons: NDArray[np.float64]
+    cfa: ColorFilterArray
+    grid: WavelengthGrid
+    sample_pitch_m: float
+
+    @property
+    def rows(self) -> int:
+        """Number of sample rows."""
+        return int(self.electrons.shape[1])
+
+    @property
+    def cols(self) -> int:
+        """Number of sample columns."""
+        return int(self.electrons.shape[2])
+
+
+def channel_currents(optical: OpticalImage, cfa: ColorFilterArray) -> ChannelCurrents:
+    """Return the optical image integrated over wavelength for each channel of `cfa`.
+
+    Raises
+    ------
+    FieldError
+        NaN, Inf or negative irradiance.
+    """
+    # A NaN anywhere makes both extremes NaN, and every comparison with NaN is false.
+    low, high = float(np.min(optical.photons)), float(np.max(optical.photons))
+    if not (low >= 0 and high < math.inf):
+        raise FieldError(
+            f"irradiance ranges from {low} to {high}; must be finite and >= 0. Look for the fault in the optics stage.",
+            path="irradiance",
+            value=low,
+        )
+    efficiency = band_quantum_efficiency(cfa, optical.grid)
+    electrons = integrate_bands(optical.photons, efficiency, bandwidth_nm=optical.grid.step_nm)
+    return ChannelCurrents(electrons, cfa, optical.grid, optical.sample_pitch_m)
 
 
 def band_quantum_efficiency(cfa: ColorFilterArray, grid: WavelengthGrid) -> NDArray[np.float64]:

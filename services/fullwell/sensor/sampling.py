@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fullwell.core.errors import FieldError
 from fullwell.scene.images import OpticalImage
+from fullwell.sensor.quantum_efficiency import ChannelCurrents
 
 __all__ = ["COVERAGE_TOLERANCE", "PixelSampling", "axis_weights", "pixel_sampling"]
 
@@ -48,12 +49,19 @@ class PixelSampling:
 
 
 def axis_weights(
-    *, pixels: int, pixel_pitch_m: float, aperture_m: float, samples: int, sample_pitch_m: float, axis: str
+    *,
+    pixels: int,
+    pixel_pitch_m: float,
+    aperture_m: float,
+    samples: int,
+    sample_pitch_m: float,
+    axis: str,
+    offset_m: float = 0.0,
 ) -> scipy.sparse.csr_array:
     """Return the weights of one axis: sparse (pixels, samples), every row of sum 1.
 
     Pixels and samples are both centred on the optical axis. Row i holds the lengths of the overlaps of the interval of
-    `aperture_m` in the middle of pixel i with the samples' cells, divided by `aperture_m`.
+    `aperture_m` whose centre lies `offset_m` after that of pixel i with the samples' cells, divided by `aperture_m`.
 
     Raises
     ------
@@ -61,6 +69,7 @@ def axis_weights(
         A photodetector is not covered by the image; `axis` ("rows" or "cols") names the field.
     """
     centre = (np.arange(pixels) + 0.5 - pixels / 2) * (pixel_pitch_m / sample_pitch_m) + samples / 2
+    centre += offset_m / sample_pitch_m
     half = 0.5 * aperture_m / sample_pitch_m
     low, high = centre - half, centre + half
     if low[0] < -COVERAGE_TOLERANCE * samples or high[-1] > samples * (1 + COVERAGE_TOLERANCE):
@@ -83,10 +92,19 @@ def axis_weights(
     return scipy.sparse.csr_array((overlap[pixel, offset], (pixel, index[pixel, offset])), shape=(pixels, samples))
 
 
-def pixel_sampling(optical: OpticalImage, *, rows: int, cols: int, pixel_pitch_m: float, fill_factor: float) -> PixelSampling:
+def pixel_sampling(
+    optical: OpticalImage | ChannelCurrents,
+    *,
+    rows: int,
+    cols: int,
+    pixel_pitch_m: float,
+    fill_factor: float,
+    offset_m: tuple[float, float] = (0.0, 0.0),
+) -> PixelSampling:
     """Return how a sensor's pixels see an optical image, for any ratio of the pitches.
 
-    The photodetector is the square in the middle of the pixel with `fill_factor` of its area. The optical image is taken as
+    The photodetector is the square with `fill_factor` of the pixel's area whose centre lies `offset_m` (down, right) from
+    the pixel's. The optical image is taken as
     constant within each of its cells, whose means it holds, so flux is conserved exactly where fill_factor is 1. Where
     pixels and samples coincide the samples are returned as they are.
 
@@ -104,8 +122,12 @@ def pixel_sampling(optical: OpticalImage, *, rows: int, cols: int, pixel_pitch_m
             samples=samples,
             sample_pitch_m=optical.sample_pitch_m,
             axis=axis,
+            offset_m=offset,
         )
-        for axis, pixels, samples in (("rows", rows, optical.rows), ("cols", cols, optical.cols))
+        for axis, pixels, samples, offset in (
+            ("rows", rows, optical.rows, offset_m[0]),
+            ("cols", cols, optical.cols, offset_m[1]),
+        )
     )
     return PixelSampling(row_weights=down, col_weights=across)
 
