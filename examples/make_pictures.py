@@ -1,0 +1,84 @@
+"""Make the pictures that stand beside the examples: one of all products, and for sweeps one of all frames.
+
+Run: python examples/make_pictures.py [--quick] [FOLDER]   (default folder: examples/pictures; --quick renders them tiny)
+"""
+
+from __future__ import annotations
+
+import io
+import sys
+import tempfile
+from pathlib import Path
+
+from PIL import Image, ImageDraw
+
+from fullwell.core import atomic_write
+from fullwell.dataset.contact import picture_of_products
+from fullwell.pipeline import RadianceCache, render_frame
+from fullwell.schema import RecipeBuilder, load_recipe
+from fullwell.storage import LocalStore
+
+HERE = Path(__file__).parent
+WIDTH_PX = 1212
+"""Width of a picture on a documentation page."""
+
+QUICK = {"quality.samples_per_pixel": "2"}
+
+
+def main(arguments: list[str]) -> None:
+    quick = "--quick" in arguments
+    folders = [Path(word) for word in arguments if not word.startswith("--")]
+    target = folders[0] if folders else HERE / "pictures"
+    for recipe in sorted(HERE.glob("[0-9][0-9]_*.yaml")):
+        make(recipe, target, overrides=QUICK if quick else {})
+
+
+def make(recipe: Path, target: Path, *, overrides: dict[str, str]) -> None:
+    """Render every frame of a recipe and write its pictures."""
+    document = load_recipe(recipe, overrides=overrides)
+    builder, cache = RecipeBuilder(document, base_dir=document.base_dir), RadianceCache()
+    frames = [builder.frame(index) for index in range(document.frame_count())]
+    with tempfile.TemporaryDirectory() as folder:
+        store = LocalStore(Path(folder))
+        for frame in frames:
+            render_frame(frame, store, f"{frame.index}", cache=cache)
+        first = {info.key.partition("/")[2]: store.get(info.key) for info in store.list("0/")}
+        images = [Image.open(io.BytesIO(store.get(f"{frame.index}/image.png"))) for frame in frames]
+    save(picture_of_products(first, f"{document.name}, frame 0"), target / f"{recipe.stem}.png")
+    if len(frames) > 1:
+        captions = [", ".join(f"{path.rpartition('.')[2]} {value}" for path, value in frame.varied) for frame in frames]
+        save(strip(images, captions), target / f"{recipe.stem}_frames.jpg")
+
+
+def strip(images: list[Image.Image], captions: list[str]) -> bytes:
+    """Return all frames side by side, four to a row, with what varies below each."""
+    columns = min(4, len(images))
+    cell_width = WIDTH_PX // columns
+    cell_height = round(cell_width * images[0].height / images[0].width) + 22
+    sheet = Image.new("RGB", (columns * cell_width, -(-len(images) // columns) * cell_height), "white")
+    draw = ImageDraw.Draw(sheet)
+    for number, (image, caption) in enumerate(zip(images, captions, strict=True)):
+        x, y = number % columns * cell_width, number // columns * cell_height
+        sheet.paste(image.convert("RGB").resize((cell_width - 8, cell_height - 26), Image.Resampling.LANCZOS), (x + 4, y + 2))
+        draw.text((x + 6, y + cell_height - 20), caption, fill="black")
+    buffer = io.BytesIO()
+    sheet.save(buffer, "PNG")
+    return buffer.getvalue()
+
+
+def save(content: bytes, target: Path) -> None:
+    """Write a picture at documentation size: diagrams as PNG with a palette, photographs as JPEG. The repository keeps it."""
+    picture = Image.open(io.BytesIO(content)).convert("RGB")
+    if picture.width > WIDTH_PX:
+        picture = picture.resize((WIDTH_PX, round(picture.height * WIDTH_PX / picture.width)), Image.Resampling.LANCZOS)
+    buffer = io.BytesIO()
+    if target.suffix == ".jpg":
+        picture.save(buffer, "JPEG", quality=88)
+    else:
+        picture.quantize(256, method=Image.Quantize.MEDIANCUT).save(buffer, "PNG", optimize=True)
+    atomic_write(target, buffer.getvalue())
+    print(target)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
