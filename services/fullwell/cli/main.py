@@ -20,7 +20,7 @@ app = typer.Typer(
 
 
 def _register() -> None:
-    from fullwell.cli import doctor, local, measure, service  # noqa: PLC0415 - commands import their modules late
+    from fullwell.cli import doctor, local, measure, service
 
     for module in (local, measure, service, doctor):
         module.register(app)

@@ -105,6 +105,10 @@ class Camera:
         return inverse
 
 
+_PARALLEL_SINE = 1e-9
+"""Sine of the angle between `up` and the view below which right and left cannot be told apart in double precision."""
+
+
 def look_at(origin_m: NDArray[np.float64], target_m: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the (4, 4) camera-to-world transform of a camera at `origin_m` that looks at `target_m`.
 
@@ -123,7 +127,7 @@ def look_at(origin_m: NDArray[np.float64], target_m: NDArray[np.float64], up: ND
     forward = forward / distance
     right = np.cross(forward, up)
     width = float(np.linalg.norm(right))
-    if width <= 1e-9 * float(np.linalg.norm(up)):
+    if width <= _PARALLEL_SINE * float(np.linalg.norm(up)):
         raise FieldError(
             f"up {up.tolist()} is zero or parallel to the viewing direction; choose another one.",
             path="up",
