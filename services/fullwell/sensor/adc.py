@@ -28,5 +28,8 @@ def quantise(adc_v: NDArray[np.float64], *, voltage_swing_v: float, adc_bits: in
 
     Full scale is 2^bits - 1 at the swing, so every code occurs. Halves go to the even code (IEEE 754), which has no bias.
     """
-    clipped = np.clip(adc_v, 0.0, voltage_swing_v)
-    return np.asarray(np.rint(clipped * (full_scale_dn(adc_bits) / voltage_swing_v)).astype(np.uint16))
+    full_scale = full_scale_dn(adc_bits)
+    codes = adc_v * (full_scale / voltage_swing_v)
+    np.rint(codes, out=codes)
+    np.clip(codes, 0.0, full_scale, out=codes)
+    return codes.astype(np.uint16)

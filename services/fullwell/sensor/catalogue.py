@@ -2,35 +2,35 @@
 
 from __future__ import annotations
 
-from functools import cache
-from importlib import resources
-
-import numpy as np
-from numpy.typing import NDArray
+import math
+from functools import cache, partial
+from typing import Final
 
 from fullwell.core.registry import Registry
-from fullwell.radiometry import Spectrum, colour_matching_functions
+from fullwell.radiometry import Spectrum
+from fullwell.sensor.cfa import cfa_pattern
+from fullwell.sensor.channel_sets import cfa_of, channel_set
 from fullwell.sensor.parameters import ColorFilterArray, SensorModel
+from fullwell.sensor.photodiodes import Photodiode, Readout
+from fullwell.sensor.tables import read_table
 
 __all__ = ["sensor", "sensor_names"]
-
-_RGGB = (("R", "G"), ("G", "B"))
-
-_IMX363_CHANNEL_CORRECTION = np.array([[0.56, 0.08, 0.01], [0.0, 0.59, 0.0], [0.0, 0.25, 0.71]])
-"""Channel gains and crosstalk of the Pixel 4a's camera: the row (r, g, b) of a wavelength is multiplied by it (lyu2022)."""
-
-_IDEAL_RANGE_NM = np.array([300.0, 1100.0])
 
 
 def sensor(name: str, path: str = "") -> SensorModel:
     """Return a sensor of the catalogue; case does not matter.
 
-    "imx363": Sony IMX363, main camera of the Google Pixel 4a, at its full 4032 x 3024 pixels.
+    "imx363": Sony IMX363, main camera of the Google Pixel 4a, at its full 4032 x 3024 pixels, figures of lyu2022.
+    "imx363-isetcam": the same as ISETCam models it: 5 e- read noise, ISO 270, no channel correction.
+    "imx490": after Sony's IMX490: split pixel, each photodiode read at two conversion gains, combined to 24 bits.
+    "mt9v024-rgb", "mt9v024-mono", "mt9v024-rccc": onsemi MT9V024, automotive, 6 um, global shutter.
+    "ar0132at-rgb", "ar0132at-rgbw", "ar0132at-rccc": onsemi AR0132AT, automotive, 3.75 um, rolling shutter.
+    "iset-a", "iset-b": the automotive sensors of liu2019, 6 um and 3 um on the same area.
     "ideal-mono": every photon an electron, no noise but shot noise, 16 bits.
     "ideal-rgb": the same with colour channels that see as the CIE 1931 standard observer does.
 
-    Change parameters with `dataclasses.replace`. Raises FieldError, naming the nearest known sensor, where `name` is not
-    known; `path` is the field that asked.
+    Every figure and its source: docs/physics/sensors.md. Change parameters with `dataclasses.replace`. Raises FieldError,
+    naming the nearest known sensor, where `name` is not known; `path` is the field that asked.
     """
     return _registry().get(name, path=path)
 
@@ -44,9 +44,21 @@ def sensor_names() -> tuple[str, ...]:
 def _registry() -> Registry[SensorModel]:
     registry: Registry[SensorModel] = Registry("sensor")
     registry.register("imx363", _imx363)
-    registry.register("ideal-mono", _ideal_mono)
-    registry.register("ideal-rgb", _ideal_rgb)
+    registry.register("imx363-isetcam", _imx363_isetcam)
+    registry.register("imx490", _imx490)
+    for pattern in ("rgb", "mono", "rccc"):
+        registry.register(f"mt9v024-{pattern}", partial(_mt9v024, f"mt9v024-{pattern}", pattern))
+    for pattern in ("rgb", "rgbw", "rccc"):
+        registry.register(f"ar0132at-{pattern}", partial(_ar0132at, f"ar0132at-{pattern}", pattern))
+    registry.register("iset-a", partial(_iset, "iset-a", rows=480, cols=752, pixel_pitch_m=6e-6))
+    registry.register("iset-b", partial(_iset, "iset-b", rows=960, cols=1504, pixel_pitch_m=3e-6))
+    registry.register("ideal-mono", partial(_ideal, "ideal-mono", "mono"))
+    registry.register("ideal-rgb", partial(_ideal, "ideal-rgb", "rggb"))
     return registry
+
+
+def _named_cfa(pattern: str, channels: str) -> ColorFilterArray:
+    return cfa_of(cfa_pattern("rggb" if pattern == "rgb" else pattern), channel_set(channels))
 
 
 def _imx363() -> SensorModel:
@@ -58,7 +70,7 @@ def _imx363() -> SensorModel:
         cols=4032,
         pixel_pitch_m=1.4e-6,
         fill_factor=1.0,
-        cfa=ColorFilterArray(pattern=_RGGB, channels=_imx363_channels()),
+        cfa=_named_cfa("rgb", "imx363"),
         well_capacity_e=6000.0,
         conversion_gain_v_per_e=conversion_gain_v_per_e,
         voltage_swing_v=0.4591,
@@ -69,28 +81,181 @@ def _imx363() -> SensorModel:
         analog_gain_ratio=1.0,
         analog_offset_v=0.0287,
         adc_bits=10,
+        array_rows=3024,
+        array_cols=4032,
     )
 
 
-def _imx363_channels() -> tuple[tuple[str, Spectrum], ...]:
-    wavelength_nm, columns = _table("imx363.csv")
-    corrected = (columns[:, :3] * columns[:, 3:]) @ _IMX363_CHANNEL_CORRECTION
-    source = "ISETCam (MIT, 2021-06-05), filters x infrared filter x channel correction of lyu2022"
-    return tuple(
-        (name, Spectrum(wavelength_nm, corrected[:, k], outside="zero", unit="e- photon^-1", source=source))
+_IMX363_DN_V: Final = 0.44875e-3
+_IMX363_ISO: Final = 270.0
+_IMX363_UNITY_ISO: Final = 55.0
+
+
+def _imx363_isetcam() -> SensorModel:
+    """Return the IMX363 with the defaults of ISETCam's own model of it (isetcam, sensorIMX363)."""
+    voltage_swing_v = 1023 * _IMX363_DN_V
+    wavelength_nm, columns = read_table("imx363.csv")
+    efficiencies = columns[:, :3] * columns[:, 3:]
+    source = "ISETCam (MIT, 2021-06-05), filters x infrared filter"
+    channels = {
+        name: Spectrum(wavelength_nm, efficiencies[:, k], outside="zero", unit="e- photon^-1", source=source)
         for k, name in enumerate("RGB")
+    }
+    return SensorModel(
+        name="imx363-isetcam",
+        rows=3024,
+        cols=4032,
+        pixel_pitch_m=1.4e-6,
+        fill_factor=1.0,
+        cfa=cfa_of(cfa_pattern("rggb"), channels),
+        well_capacity_e=6000.0,
+        conversion_gain_v_per_e=voltage_swing_v / 6000.0,
+        voltage_swing_v=voltage_swing_v,
+        dark_current_e_per_s=0.0,
+        read_noise_e=5.0,
+        dsnu_v=0.0,
+        prnu_fraction=0.007,
+        analog_gain_ratio=_IMX363_ISO / _IMX363_UNITY_ISO,
+        analog_offset_v=64 * _IMX363_DN_V,
+        adc_bits=10,
+        array_rows=3024,
+        array_cols=4032,
     )
 
 
-def _table(file: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return wavelengths (n,) [nm] and the other columns (n, k) of a table beside this module."""
-    text = resources.files("fullwell.sensor").joinpath("data", file).read_text(encoding="utf-8")
-    lines = [line for line in text.splitlines() if line and not line.startswith("#")]
-    numbers = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
-    return numbers[:, 0], numbers[:, 1:]
+def _imx490() -> SensorModel:
+    """Return the split pixel with wells, fill factors, ratio of the gains and bits as ISETAuto models it.
+
+    The rest is representative. The low gain of each photodiode fills the converter's range above its offset with a full well.
+    """
+    swing_v, offset_v = 1.04, 0.016
+    large_v_per_e, small_v_per_e = (swing_v - offset_v) / 120e3, (swing_v - offset_v) / 60e3
+    gain_ratio = 4.0
+    return SensorModel(
+        name="imx490",
+        rows=1860,
+        cols=2880,
+        pixel_pitch_m=3e-6,
+        fill_factor=0.9,
+        cfa=_named_cfa("rgb", "imx363"),
+        well_capacity_e=120e3,
+        conversion_gain_v_per_e=large_v_per_e,
+        voltage_swing_v=swing_v,
+        dark_current_e_per_s=0.0,
+        read_noise_e=4.0,
+        dsnu_v=0.0,
+        prnu_fraction=0.0,
+        analog_gain_ratio=1.0,
+        analog_offset_v=offset_v,
+        adc_bits=12,
+        array_rows=1860,
+        array_cols=2880,
+        photodiodes=(
+            Photodiode(
+                "large",
+                fill_factor=0.9,
+                well_capacity_e=120e3,
+                readouts=(
+                    Readout("high", gain_ratio * large_v_per_e, read_noise_e=1.0),
+                    Readout("low", large_v_per_e, read_noise_e=4.0),
+                ),
+            ),
+            Photodiode(
+                "small",
+                fill_factor=0.1,
+                well_capacity_e=60e3,
+                readouts=(
+                    Readout("high", gain_ratio * small_v_per_e, read_noise_e=1.0),
+                    Readout("low", small_v_per_e, read_noise_e=4.0),
+                ),
+            ),
+        ),
+    )
 
 
-def _ideal(name: str, cfa: ColorFilterArray) -> SensorModel:
+_ONSEMI_V_PER_E: Final = 110e-6
+_ONSEMI_SWING_V: Final = 2.8
+"""As ISETCam models both sensors (isetcam, MT9V024Create and ar0132atCreate): estimates, not the maker's figures."""
+
+
+def _mt9v024(name: str, pattern: str) -> SensorModel:
+    """Return the sensor: size, pitch, shutter and bits of its data sheet; read noise and dark current 1 mV and 1 mV/s."""
+    return SensorModel(
+        name=name,
+        rows=480,
+        cols=752,
+        pixel_pitch_m=6e-6,
+        fill_factor=0.8,
+        cfa=_named_cfa(pattern, "mt9v024"),
+        well_capacity_e=_ONSEMI_SWING_V / _ONSEMI_V_PER_E,
+        conversion_gain_v_per_e=_ONSEMI_V_PER_E,
+        voltage_swing_v=_ONSEMI_SWING_V,
+        dark_current_e_per_s=1e-3 / _ONSEMI_V_PER_E,
+        read_noise_e=1e-3 / _ONSEMI_V_PER_E,
+        dsnu_v=0.0,
+        prnu_fraction=0.0,
+        analog_gain_ratio=1.0,
+        analog_offset_v=0.0,
+        adc_bits=10,
+        array_rows=480,
+        array_cols=752,
+    )
+
+
+_AR0132AT_BEST_SNR_DB: Final = 43.9
+_AR0132AT_LINES_PER_S: Final = 45.0 * 1000.0
+
+
+def _ar0132at(name: str, pattern: str) -> SensorModel:
+    """Return the sensor: its full well is what shot noise alone needs for the data sheet's 43.9 dB."""
+    return SensorModel(
+        name=name,
+        rows=960,
+        cols=1280,
+        pixel_pitch_m=3.75e-6,
+        fill_factor=0.75,
+        cfa=_named_cfa(pattern, "mt9v024"),
+        well_capacity_e=math.pow(10.0, _AR0132AT_BEST_SNR_DB / 10.0),
+        conversion_gain_v_per_e=_ONSEMI_V_PER_E,
+        voltage_swing_v=_ONSEMI_SWING_V,
+        dark_current_e_per_s=1e-3 / _ONSEMI_V_PER_E,
+        read_noise_e=1e-3 / _ONSEMI_V_PER_E,
+        dsnu_v=0.0,
+        prnu_fraction=0.0,
+        analog_gain_ratio=1.0,
+        analog_offset_v=0.0,
+        adc_bits=12,
+        array_rows=960,
+        array_cols=1280,
+        line_time_s=1.0 / _AR0132AT_LINES_PER_S,
+    )
+
+
+def _iset(name: str, *, rows: int, cols: int, pixel_pitch_m: float) -> SensorModel:
+    """Return an automotive sensor of liu2019: size, pitch, 1 mV read noise, 1 mV/s dark; the rest as the MT9V024."""
+    return SensorModel(
+        name=name,
+        rows=rows,
+        cols=cols,
+        pixel_pitch_m=pixel_pitch_m,
+        fill_factor=0.8,
+        cfa=_named_cfa("rgb", "mt9v024"),
+        well_capacity_e=_ONSEMI_SWING_V / _ONSEMI_V_PER_E,
+        conversion_gain_v_per_e=_ONSEMI_V_PER_E,
+        voltage_swing_v=_ONSEMI_SWING_V,
+        dark_current_e_per_s=1e-3 / _ONSEMI_V_PER_E,
+        read_noise_e=1e-3 / _ONSEMI_V_PER_E,
+        dsnu_v=0.0,
+        prnu_fraction=0.0,
+        analog_gain_ratio=1.0,
+        analog_offset_v=0.0,
+        adc_bits=10,
+        array_rows=rows,
+        array_cols=cols,
+    )
+
+
+def _ideal(name: str, pattern: str) -> SensorModel:
     """Return a sensor whose only imperfections are photons coming one by one and 16 bits: 1.5 e- per digital number."""
     return SensorModel(
         name=name,
@@ -98,7 +263,7 @@ def _ideal(name: str, cfa: ColorFilterArray) -> SensorModel:
         cols=640,
         pixel_pitch_m=4e-6,
         fill_factor=1.0,
-        cfa=cfa,
+        cfa=_named_cfa(pattern, "ideal"),
         well_capacity_e=100_000.0,
         conversion_gain_v_per_e=1e-5,
         voltage_swing_v=1.0,
@@ -110,23 +275,3 @@ def _ideal(name: str, cfa: ColorFilterArray) -> SensorModel:
         analog_offset_v=0.0,
         adc_bits=16,
     )
-
-
-def _ideal_mono() -> SensorModel:
-    everything = Spectrum(_IDEAL_RANGE_NM, np.ones(2), outside="zero", unit="e- photon^-1", source="ideal")
-    return _ideal("ideal-mono", ColorFilterArray(pattern=(("W",),), channels=(("W", everything),)))
-
-
-def _ideal_rgb() -> SensorModel:
-    """Return the colour sensor that meets the Luther condition.
-
-    The observer's functions weigh energy, electrons count photons: dividing by the wavelength turns one into the other. Each
-    channel is scaled to a peak of 1.
-    """
-    channels = []
-    for name, curve in zip("RGB", colour_matching_functions(), strict=True):
-        per_photon = curve.values / curve.wavelength_nm
-        efficiency = per_photon / np.max(per_photon)
-        source = "CIE 1931 standard observer over wavelength, peak 1"
-        channels.append((name, Spectrum(curve.wavelength_nm, efficiency, outside="zero", unit="e- photon^-1", source=source)))
-    return _ideal("ideal-rgb", ColorFilterArray(pattern=_RGGB, channels=tuple(channels)))

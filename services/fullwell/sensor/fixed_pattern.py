@@ -124,19 +124,19 @@ def pixel_normals(pattern: FixedPattern, effect: str) -> NDArray[np.float32]:
     """Return standard normal numbers, one for each pixel of the window, (rows, cols), not writeable.
 
     Each row of the chip has a counter range of its own, so a window is a cut-out of the chip's pattern and costs only its own
-    rows. Recent ones are kept.
+    rows up to its right edge. Recent ones are kept.
     """
     window, key = pattern.window, pattern.key(effect)
-    identity = (key, window.top, window.left, window.rows, window.cols, window.array_cols)
+    identity = (key, window.top, window.left, window.rows, window.cols)
     kept = _kept.get(identity)
     if kept is not None:
         return kept
     normals = np.empty((window.rows, window.cols), np.float32)
-    line = np.empty(window.array_cols, np.float32)
+    line = np.empty(window.left + window.cols, np.float32)
     for row in range(window.rows):
         generator = _at(key, window.top + row)
         generator.standard_normal(out=line, dtype=np.float32)
-        normals[row] = line[window.left : window.left + window.cols]
+        normals[row] = line[window.left :]
     normals.setflags(write=False)
     _kept.put(identity, normals)
     return normals

@@ -23,4 +23,6 @@ def poisson_electrons(mean_electrons: NDArray[np.float64], *, rng: np.random.Gen
     ----------
     hormann1993, the transformed rejection that numpy's generator uses from a mean of 10 on.
     """
-    return rng.poisson(np.minimum(mean_electrons, LARGEST_MEAN_E)).astype(np.float64)
+    if mean_electrons.size > 0 and float(np.max(mean_electrons)) > LARGEST_MEAN_E:
+        mean_electrons = np.minimum(mean_electrons, LARGEST_MEAN_E)
+    return rng.poisson(mean_electrons).astype(np.float64)

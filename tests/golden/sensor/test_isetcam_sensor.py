@@ -11,10 +11,10 @@ from fullwell.radiometry import Spectrum, WavelengthGrid
 from fullwell.sensor import ColorFilterArray, OpticalImage, sensor
 from fullwell.sensor.adc import quantise
 from fullwell.sensor.amplifier import amplify
-from fullwell.sensor.catalogue import _table
 from fullwell.sensor.cfa import mosaic
 from fullwell.sensor.quantum_efficiency import integrate_bands
 from fullwell.sensor.sampling import pixel_sampling
+from fullwell.sensor.tables import read_table
 
 GOLDEN_TOLERANCE = 1e-9
 """Relative; the promise for ISETCam's numbers. Sums run in another order there."""
@@ -84,7 +84,7 @@ def test_gain_offset_and_clipping_give_isetcams_volts(reference: Callable[[str],
 
 def test_the_imx363_table_is_the_published_one(reference: Callable[[str], Any]) -> None:
     spectra = reference("isetcam/spectra.json")
-    wavelength_nm, columns = _table("imx363.csv")
+    wavelength_nm, columns = read_table("imx363.csv")
     np.testing.assert_array_equal(wavelength_nm, spectra["imx363_wave_nm"])
     np.testing.assert_allclose(columns[:, :3].T, spectra["imx363_filter_spectra"], rtol=TABLE_TOLERANCE)
     np.testing.assert_allclose(columns[:, 3], spectra["imx363_ir_filter"], rtol=TABLE_TOLERANCE)
