@@ -12,7 +12,7 @@ import struct
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -21,9 +21,10 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from fullwell.core.errors import FieldError, ShapeError
+from fullwell.dataset.filter_codes import standard_codes
 from fullwell.radiometry import RadianceImage, Spectrum, WavelengthGrid
 from fullwell.radiometry.photons import energy_to_photons, photons_to_energy
-from fullwell.scene.images import OpticalImage, RawImage
+from fullwell.scene.images import CaptureRecord, OpticalImage, RawImage
 
 __all__ = [
     "DepthImage",
@@ -53,8 +54,6 @@ _METADATA = "fullwell"
 _STANDARD_ERROR = "relativeStandardError"
 _FIRST_ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 _MAX_ID = 2**24 - 1
-_CFA_PLANES = {"r": 0, "g": 1, "gr": 1, "gb": 1, "b": 2, "c": 3, "m": 4, "y": 5, "w": 6}
-"""Colour codes of the TIFF/EP tag CFAPattern (ISO 12234-2:2001)."""
 
 
 # Spectral images -----------------------------------------------------------------------------------------------------
@@ -287,9 +286,9 @@ def _png(image: Image.Image, info: PngInfo) -> bytes:
 
 
 def encode_raw_npz(raw: RawImage) -> bytes:
-    """Return a raw image as NPZ: `dn` (rows, cols) uint16, `mean_electrons` where known, and `fullwell` (JSON text).
+    """Return a raw image as NPZ: `dn` (rows, cols), `mean_electrons` where known, and `fullwell` (JSON text).
 
-    `fullwell` holds the filter pattern, the channels' quantum efficiencies, black and white level, exposure time and bits.
+    `fullwell` holds the filter pattern, the channels' quantum efficiencies, black and white level, bits, times and captures.
     """
     metadata = {**_raw_entries(raw), "channels": [_channel_entry(name, curve) for name, curve in raw.channels]}
     metadata["grid"] = _grid_entries(raw.grid)
@@ -319,14 +318,19 @@ def decode_raw_npz(content: bytes) -> RawImage:
         adc_bits=metadata["adc_bits"],
         saturated_fraction=metadata["saturated_fraction"],
         mean_electrons=arrays.get("mean_electrons"),
+        line_time_s=metadata["line_time_s"],
+        electrons_per_dn=metadata["electrons_per_dn"],
+        channel_exposure_time_s=tuple((name, time_s) for name, time_s in metadata["channel_exposure_time_s"]),
+        captures=tuple(CaptureRecord(**entry) for entry in metadata["captures"]),
     )
 
 
 def encode_raw_tiff(raw: RawImage) -> bytes:
     """Return a raw image as uncompressed 16-bit grey TIFF; the image description holds the metadata as JSON.
 
-    Where the channels have names of TIFF/EP colours (r, g, b, c, m, y, w) the tags CFARepeatPatternDim and CFAPattern state
-    the mosaic; BlackLevel and WhiteLevel are DNG's. Quantum efficiencies are only in raw.npz.
+    Where the channels have names of TIFF/EP colours (R, G, B, Cy, M, Y, W; C is clear, or cyan beside M or Y) the tags
+    CFARepeatPatternDim and CFAPattern state the mosaic; BlackLevel and WhiteLevel are DNG's. Quantum efficiencies are only in
+    raw.npz. Images combined to more than 16 bits have 32.
     """
     import tifffile  # noqa: PLC0415  (slow to import where no TIFF is written)
 
@@ -335,7 +339,7 @@ def encode_raw_tiff(raw: RawImage) -> bytes:
         (50714, "d", 1, raw.black_level_dn, True),
         (50717, "I", 1, round(raw.white_level_dn), True),
     ]
-    planes = [_CFA_PLANES.get(name.casefold()) for row in raw.pattern for name in row]
+    planes = standard_codes([name for row in raw.pattern for name in row])
     if None not in planes:
         tags += [
             (33421, "H", 2, (rows, cols), True),
@@ -363,7 +367,7 @@ def decode_raw_tiff(content: bytes) -> tuple[NDArray[np.uint16], dict[str, Any]]
     try:
         with tifffile.TiffFile(io.BytesIO(content)) as file:
             page = file.pages[0]
-            return np.asarray(page.asarray(), dtype=np.uint16), json.loads(page.description)
+            return np.asarray(page.asarray()), json.loads(page.description)
     except (tifffile.TiffFileError, OSError, ValueError, IndexError, struct.error) as error:
         raise FieldError(f"the TIFF file is damaged ({error}); fetch or render it again.") from error
 
@@ -377,6 +381,10 @@ def _raw_entries(raw: RawImage) -> dict[str, Any]:
         "sensor_name": raw.sensor_name,
         "adc_bits": int(raw.adc_bits),
         "saturated_fraction": float(raw.saturated_fraction),
+        "line_time_s": float(raw.line_time_s),
+        "electrons_per_dn": float(raw.electrons_per_dn),
+        "channel_exposure_time_s": [[name, float(time_s)] for name, time_s in raw.channel_exposure_time_s],
+        "captures": [asdict(capture) for capture in raw.captures],
     }
 
 

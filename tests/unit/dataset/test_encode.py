@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from fullwell.core import FieldError, ShapeError
 from fullwell.core.constants import NM_PER_M, PLANCK_J_S, SPEED_OF_LIGHT_M_PER_S
 from fullwell.dataset import encode
 from fullwell.radiometry import RadianceImage, Spectrum, WavelengthGrid
-from fullwell.scene.images import OpticalImage, RawImage
+from fullwell.scene.images import CaptureRecord, OpticalImage, RawImage
 
 GRID = WavelengthGrid(400, 700, 100)
 FLOAT32_ROUNDING = 3e-7
@@ -140,6 +141,34 @@ def test_a_raw_archive_comes_back_exactly() -> None:
         assert getattr(after, name) == getattr(before, name)
     assert [name for name, _ in after.channels] == ["r", "g", "b"]
     assert_array_equal(after.channels[0][1].values, before.channels[0][1].values)
+
+
+def test_a_raw_archive_keeps_what_a_combined_image_was_made_of() -> None:
+    record = CaptureRecord("large", "low", 0.0, 0.01, 1.0, 5.9, 0.1, 0.75)
+    before = replace(
+        raw(),
+        dn=np.full((4, 6), 2**20, np.uint32),
+        line_time_s=1e-5,
+        electrons_per_dn=5.9,
+        channel_exposure_time_s=(("r", 0.02), ("g", 0.01)),
+        captures=(record, replace(record, readout="high")),
+    )
+    after = encode.decode_raw_npz(encode.encode_raw_npz(before))
+    assert after.dn.dtype == np.uint32
+    assert_array_equal(after.dn, before.dn)
+    for name in ("line_time_s", "electrons_per_dn", "channel_exposure_time_s", "captures"):
+        assert getattr(after, name) == getattr(before, name)
+    dn, _ = encode.decode_raw_tiff(encode.encode_raw_tiff(before))
+    assert_array_equal(dn, before.dn)
+
+
+def test_a_clear_filter_is_not_called_cyan_in_a_tiff() -> None:
+    import tifffile
+
+    before = raw()
+    clear = replace(before, pattern=(("r", "C"), ("C", "C")), channels=(before.channels[0], ("C", before.channels[1][1])))
+    with tifffile.TiffFile(io.BytesIO(encode.encode_raw_tiff(clear))) as file:
+        assert bytes(file.pages[0].tags[33422].value) == b"\x00\x06\x06\x06"
 
 
 def test_a_raw_archive_is_read_by_numpy_alone() -> None:
