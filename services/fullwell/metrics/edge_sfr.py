@@ -238,8 +238,8 @@ def _locate(x: NDArray[np.float64], y: NDArray[np.float64], values: NDArray[np.f
                 position.append(found)
         if len(height) < max(5.0, MIN_ROWS_SHARE * len(rows)):
             raise FieldError(
-                f"the edge crosses only {len(height)} of the region's {len(rows)} rows (or columns) at least "
-                f"{MIN_MARGIN_PX:g} px from its sides; choose a region with the edge in its middle, from side to side.",
+                f"no edge crosses the region from side to side: one is found in {len(height)} of {len(rows)} rows (or columns) "
+                f"at least {MIN_MARGIN_PX:g} px from the ends. Choose a region with the edge in its middle.",
                 path="region",
                 value=len(height),
             )

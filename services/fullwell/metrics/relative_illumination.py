@@ -12,8 +12,8 @@ from fullwell.core.errors import FieldError, ShapeError
 
 __all__ = ["RelativeIllumination", "relative_illumination"]
 
-EVEN_POWERS: Final = 3
-"""Powers r^0, r^2 .. r^6 of the fitted falloff; cos^4 to 40 degrees off the axis is followed to 1e-3."""
+EVEN_POWERS: Final = 5
+"""Powers r^0, r^2 .. r^10 of the fitted falloff; cos^4 to 40 degrees off the axis is followed to 1e-3."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,7 +96,7 @@ def relative_illumination(
 
 
 def _even_fit(share: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the coefficients of 1, r^2, r^4, r^6 by least squares; r is 1 in the corner."""
+    """Return the coefficients of 1, r^2 .. r^10 by least squares; r is 1 in the corner."""
     design = np.stack([share ** (2 * power) for power in range(EVEN_POWERS + 1)], axis=1)
     return np.asarray(np.linalg.lstsq(design, values, rcond=None)[0])
 

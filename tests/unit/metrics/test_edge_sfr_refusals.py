@@ -49,7 +49,7 @@ def test_an_edge_along_the_grid_is_refused_with_what_to_do() -> None:
 
 
 def test_an_edge_that_leaves_the_region_is_refused() -> None:
-    with pytest.raises(FieldError, match="crosses only"):
+    with pytest.raises(FieldError, match="from side to side"):
         edge_sfr(_edge(rows=80, cols=40, slope=0.6, shift=24.0))
 
 
