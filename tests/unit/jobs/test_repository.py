@@ -101,7 +101,7 @@ for number in range(start, 40, 2):
 
 def test_two_processes_finish_a_job_together(repository: JobRepository, database: Database) -> None:
     job = new_job(repository, 40)
-    url = f"sqlite:///{database.engine.url.database}"
+    url = database.engine.url.render_as_string(hide_password=False)
     commands = [[sys.executable, "-c", FINISH_EVERY_OTHER, url, job.id, str(start)] for start in (0, 1)]
     processes = [subprocess.Popen(command) for command in commands]
     assert [process.wait(60) for process in processes] == [0, 0]
