@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import inspect
 import importlib
 import pickle
 import pkgutil
@@ -34,11 +35,18 @@ def test_every_error_survives_pickling(protocol: int) -> None:
     errors = _all_errors()
     assert len(errors) >= 10
     for kind in errors:
-        error = kind("what is wrong; what is legal; what to do.")
+        error = _example(kind)
         for copied in (pickle.loads(pickle.dumps(error, protocol)), copy.copy(error)):
             assert type(copied) is kind
             assert str(copied) == str(error)
             assert vars(copied) == vars(error)
+
+
+def _example(kind: type[FullwellError]) -> FullwellError:
+    """Return an error of a class whose constructor may want more than the message (an HTTP status, say)."""
+    parameters = list(inspect.signature(kind).parameters.values())[1:]
+    required = [p for p in parameters if p.default is p.empty and p.kind is p.POSITIONAL_OR_KEYWORD]
+    return kind("what is wrong; what is legal; what to do.", *(400 for _ in required))
 
 
 def test_a_field_error_keeps_field_and_value() -> None:
