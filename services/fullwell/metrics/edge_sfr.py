@@ -18,8 +18,8 @@ from fullwell.core.errors import FieldError, ShapeError, unknown_name_message
 __all__ = ["EdgeResponse", "Window", "edge_sfr", "mosaic_edge_sfr"]
 
 Window = Literal["tukey", "hamming", "none"]
-"""Weight of the line spread function against the noise of its far ends: flat over the inner half with cosine ends (of
-ISO 12233:2023), the Hamming window of the earlier editions, or equal weight."""
+"""Weight of the line spread function against the noise of its far ends: flat over the inner half with cosine ends (Tukey),
+the Hamming window of ISO 12233's editions up to 2017, or equal weight."""
 
 MIN_SIDE_PX: Final = 10
 """Fewer rows or columns hold no profile and both its plateaus."""

@@ -114,7 +114,7 @@ def sensor_figures(
     """Return threshold, capacity, best SNR and dynamic range of a sensor.
 
     The threshold is the exact root of signal = noise, 1/2 + sqrt(1/4 + dark variance); EMVA prints the approximation
-    1/2 + sqrt(dark variance), higher by less than 1/4 electron where the dark noise is small.
+    1/2 + sqrt(dark variance), lower by at most 1/2 electron, where there is no dark noise.
 
     Parameters
     ----------
