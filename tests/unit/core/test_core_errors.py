@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import copy
-import inspect
 import importlib
+import inspect
 import pickle
 import pkgutil
 
