@@ -332,7 +332,7 @@ def wavefront_psf(
     psf = np.abs(scipy.fft.fftshift(scipy.fft.fft2(pupil))) ** 2
     degrees = math.degrees(wavelength_nm * 1e-6 / plane_mm)
     pitch_m = degrees * _EYE_FOCAL_LENGTH_M * math.tan(math.radians(1.0))
-    return (np.arange(samples) - samples // 2) * pitch_m, np.asarray(psf / np.sum(psf))
+    return np.asarray((np.arange(samples) - samples // 2) * pitch_m, dtype=np.float64), np.asarray(psf / np.sum(psf))
 
 
 def wavefront_lens(zernike_um: Sequence[float] = (0.0,), *, wavelength_nm: ArrayLike, pupil_mm: float = 3.0) -> IsetcamLens:
@@ -364,7 +364,9 @@ def _form_image(scene: IsetcamScene, lens: IsetcamLens, *, diffract: bool) -> Is
         photons, hfov_deg = _bordered(photons, hfov_deg)
         if diffract:
             photons = _blurred(photons, scene.wavelength_nm, hfov_deg, lens)
-    return IsetcamOpticalImage(photons, scene.wavelength_nm, hfov_deg, lens.image_distance_m(scene.distance_m))
+    image_distance_m = lens.image_distance_m(scene.distance_m)
+    pitch_m = 2.0 * image_distance_m * math.tan(math.radians(hfov_deg / 2)) / photons.shape[1]
+    return IsetcamOpticalImage(photons, scene.wavelength_nm, pitch_m, image_distance_m, lens.focal_length_m)
 
 
 def _bordered(photons: NDArray[np.float64], hfov_deg: float) -> tuple[NDArray[np.float64], float]:
@@ -382,8 +384,8 @@ def _frequencies(rows: int, cols: int, hfov_deg: float, distance_m: float) -> tu
     width_m = 2.0 * distance_m * math.tan(math.radians(hfov_deg / 2))
     vfov_deg = 2.0 * math.degrees(math.atan(width_m / cols * rows / 2 / distance_m))
     per_degree = hfov_deg / width_m
-    row_frequency = frequency_support(rows) * (rows / 2 / vfov_deg * per_degree)
-    return row_frequency, frequency_support(cols) * (cols / 2 / hfov_deg * per_degree)
+    row_frequency = np.asarray(frequency_support(rows) * (rows / 2 / vfov_deg * per_degree))
+    return row_frequency, np.asarray(frequency_support(cols) * (cols / 2 / hfov_deg * per_degree))
 
 
 def _blurred(

@@ -19,6 +19,7 @@ __all__ = [
     "DEFAULT_DISTANCE_M",
     "IsetcamOpticalImage",
     "IsetcamScene",
+    "from_optical_image",
     "scene_from_radiance",
     "with_illuminant",
     "with_mean_luminance",
@@ -134,22 +135,26 @@ class IsetcamOpticalImage:
         (rows, cols, bands) [photons s^-1 m^-2 nm^-1] sampled at `wavelength_nm`.
     wavelength_nm
         (bands,) [nm].
-    hfov_deg
-        Horizontal field of view with the border [deg].
+    sample_pitch_m
+        Spacing of the samples on the sensor plane [m].
     image_distance_m
         From the lens to the image plane of the scene [m].
+    focal_length_m
+        Of the lens [m]; None takes the image distance, as for a scene at infinity. Automatic exposure of a crop mixes the
+        two up.
     """
 
     photons: NDArray[np.float64]
     wavelength_nm: NDArray[np.float64]
-    hfov_deg: float
+    sample_pitch_m: float
     image_distance_m: float
+    focal_length_m: float | None = None
 
     def __post_init__(self) -> None:
         wave = check_wavelengths(self.wavelength_nm)
         object.__setattr__(self, "wavelength_nm", wave)
         object.__setattr__(self, "photons", _checked_photons(self.photons, wave.size, "irradiance"))
-        _check_range("hfov_deg", self.hfov_deg, 0, 180)
+        _check_range("sample_pitch_m", self.sample_pitch_m, 0, math.inf)
         _check_range("image_distance_m", self.image_distance_m, 0, math.inf)
 
     @property
@@ -165,12 +170,12 @@ class IsetcamOpticalImage:
     @property
     def width_m(self) -> float:
         """Width on the sensor plane [m]."""
-        return 2.0 * self.image_distance_m * math.tan(math.radians(self.hfov_deg / 2))
+        return self.sample_pitch_m * self.cols
 
     @property
-    def sample_pitch_m(self) -> float:
-        """Spacing of the samples on the sensor plane [m]."""
-        return self.width_m / self.cols
+    def hfov_deg(self) -> float:
+        """Horizontal field of view with the border [deg]."""
+        return 2.0 * math.degrees(math.atan(self.width_m / 2 / self.image_distance_m))
 
     @property
     def height_m(self) -> float:
@@ -191,6 +196,14 @@ class IsetcamOpticalImage:
             raise ShapeError(f"the image has {self.wavelength_nm.size} bands that are not those of the grid {grid}.")
         photons: NDArray[np.float32] = self.photons  # type: ignore[assignment]  # 1e-9 needs double precision
         return OpticalImage(photons=photons, grid=grid, sample_pitch_m=self.sample_pitch_m, notes=notes)
+
+
+def from_optical_image(optical: OpticalImage, *, image_distance_m: float = 1.0) -> IsetcamOpticalImage:
+    """Return the pipeline's optical image with its band means as samples at the band centres.
+
+    The distance of the image plane matters only to ISETCam's automatic exposure by luminance, which works in angles.
+    """
+    return IsetcamOpticalImage(optical.photons, optical.grid.centres_nm, optical.sample_pitch_m, image_distance_m)  # type: ignore[arg-type]
 
 
 def with_mean_luminance(scene: IsetcamScene, cd_m2: float) -> IsetcamScene:
