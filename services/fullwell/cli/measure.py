@@ -389,9 +389,25 @@ def _chart_targets(frame: _Frame, illuminant_name: str | None) -> tuple[str, NDA
     light: Spectrum | None = None if frame.rig is None else frame.rig.isp.illuminant
     if illuminant_name is not None:
         light = illuminant(illuminant_name, path="--illuminant")
+    elif light is None:
+        light = _scene_light(frame)
     if light is None:
         raise FieldError("the picture's light is not known; name it with --illuminant, for example d65.", path="--illuminant")
     return light.source or "of the recipe", adapted_srgb_targets(light, adapt_white=balanced)[1:]
+
+
+def _scene_light(frame: _Frame) -> Spectrum | None:
+    """Return the light of the scene's own lamps, or None where the recipe's scene cannot be built from the manifest alone."""
+    from fullwell.isp import scene_illuminant
+    from fullwell.schema import build_frame, load_recipe
+
+    try:
+        described = build_frame(load_recipe(frame.manifest["recipe"]))
+    except FullwellError as error:
+        frame.notes.append(f"the scene could not be built from the recipe in the manifest: {error}")
+        return None
+    (rig,) = [rig for rig in described.cameras if rig.camera.name == frame.camera["name"]]
+    return scene_illuminant(described.scene, rig.camera)
 
 
 def _scene_report(frame: _Frame) -> dict[str, Any]:

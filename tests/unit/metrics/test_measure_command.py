@@ -46,7 +46,16 @@ RECIPE: dict[str, Any] = {
             "name": "main",
             "pose": {"origin_m": [0, -2, 0], "target_m": [0, 0, 0]},
             "lens": {"hfov_deg": 20, "f_number": 2},
-            "sensors": [{"name": "phone", "model": "imx363", "rows": ROWS, "cols": COLS, "exposure": {"time_s": 0.01}}],
+            "sensors": [
+                {
+                    "name": "phone",
+                    "model": "imx363",
+                    "rows": ROWS,
+                    "cols": COLS,
+                    "exposure": {"time_s": 0.01},
+                    "isp": {"illuminant": "d65"},
+                }
+            ],
         }
     ],
     "outputs": ["raw.npz", "image.png"],
@@ -160,6 +169,19 @@ def test_another_light_makes_a_difference(frame: Path) -> None:
         _report(*words, "--illuminant", "A")["patches"]["mean_delta_e_2000"]
         > _report(*words)["patches"]["mean_delta_e_2000"] + 1
     )
+
+
+def test_a_picture_made_for_the_scenes_own_light_is_compared_under_it(frame: Path) -> None:
+    """The scene is lit by D65, so that nothing changes; the name says where the light came from."""
+    words = (frame, "--patches", "colorchecker", "--corners", CORNERS)
+    named = _report(*words)["patches"]
+    manifest = json.loads((frame / "manifest.json").read_text())
+    manifest["recipe"]["cameras"][0]["sensors"][0]["isp"]["illuminant"] = "scene"
+    (frame / "manifest.json").write_text(json.dumps(manifest))
+    found = _report(*words)["patches"]
+    assert found["illuminant"] != named["illuminant"]
+    bands_of_another_grid = 0.1
+    assert found["mean_delta_e_2000"] == pytest.approx(named["mean_delta_e_2000"], abs=bands_of_another_grid)
 
 
 def test_a_flat_field_has_its_falloff_reported(frame: Path) -> None:
