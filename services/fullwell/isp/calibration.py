@@ -11,7 +11,7 @@ from fullwell.isp.black_level import linear_signal
 from fullwell.isp.colour_matrix import adapted_srgb_targets, channel_responses, fit_colour_matrix, noise_amplification
 from fullwell.isp.parameters import IspSettings
 from fullwell.isp.white_balance import gains_for_gray_world, gains_for_white, gains_for_white_patch, unsaturated_cells
-from fullwell.radiometry import Spectrum, WavelengthGrid, illuminant, luminance_cd_m2
+from fullwell.radiometry import Spectrum, WavelengthGrid, chromaticity, illuminant, luminance_cd_m2
 from fullwell.scene.images import RawImage
 
 __all__ = ["ColourCalibration", "calibrate", "used_channels"]
@@ -43,6 +43,11 @@ class ColourCalibration:
     channel_gain_ratio: NDArray[np.float64]
     white_response: NDArray[np.float64]
     colour_matrix: NDArray[np.float64] | None
+
+    @property
+    def illuminant_xy(self) -> tuple[float, float] | None:
+        """CIE 1931 chromaticity (x, y) of the illuminant; None where it cannot be seen."""
+        return chromaticity(self.illuminant) if luminance_cd_m2(self.illuminant) > 0 else None
 
     @property
     def noise_amplification(self) -> float | None:

@@ -39,7 +39,7 @@ class DisplayImage:
     rgb: NDArray[np.uint8]
     channel_gain_ratio: NDArray[np.float64]
     colour_matrix: NDArray[np.float64] | None
-    calibration: ColourCalibration | None = None
+    calibration: ColourCalibration
 
     def __post_init__(self) -> None:
         if self.rgb.ndim != 3 or self.rgb.shape[2] != 3:

@@ -15,7 +15,8 @@ from fullwell.core.errors import CancelledError, ConflictError, NotFoundError
 from fullwell.core.hashing import sha256_hex
 from fullwell.core.rng import seed32, stream
 from fullwell.dataset import encode
-from fullwell.isp import develop
+from fullwell.dataset.dng import check_dng_pattern, encode_raw_dng
+from fullwell.isp import DisplayImage, develop, scene_illuminant
 from fullwell.labels import Labels, labels_document, make_labels
 from fullwell.optics import compute_irradiance
 from fullwell.pipeline.cache import RadianceCache
@@ -66,6 +67,7 @@ def render_frame(
     published = _published(store, prefix, digest)
     if published is not None:
         return published
+    _check_products(frame)
     run = _Run(frame, plan_frame(frame), cache or RadianceCache(), progress, should_cancel)
     for position, rig in enumerate(frame.cameras):
         _camera_products(run, rig, position)
@@ -85,6 +87,14 @@ def render_frame(
         return published
     run.report("done", 1.0)
     return manifest
+
+
+def _check_products(frame: FrameDescription) -> None:
+    """Refuse products that a sensor cannot have before anything is rendered."""
+    if "raw.dng" in frame.outputs:
+        for rig in frame.cameras:
+            for sensor in rig.sensors:
+                check_dng_pattern(sensor.model.cfa.pattern)
 
 
 def _published(store: ObjectStore, prefix: str, digest: str) -> dict[str, Any] | None:
@@ -234,9 +244,12 @@ def _sensor_products(
         document |= _raw_document(raw, sensor.model, radiance)
         _add(run, f"{folder}raw.npz", lambda: encode.encode_raw_npz(raw))
         _add(run, f"{folder}raw.tiff", lambda: encode.encode_raw_tiff(raw))
+        light = scene_illuminant(run.frame.scene, rig.camera) if sensor.isp.illuminant is None else None
+        _add(run, f"{folder}raw.dng", lambda: encode_raw_dng(raw, sensor.isp, scene_light=light))
         if run.plan.display:
             with run.stage(f"{rig.camera.name}/{sensor.name}: isp"):
-                display = develop(raw, sensor.isp)
+                display = develop(raw, sensor.isp, scene_light=light)
+            document["isp"] = _isp_document(display)
             _add(run, f"{folder}image.png", lambda: encode.encode_rgb_png(display.rgb))
     if run.plan.labels:
         with run.stage(f"{rig.camera.name}/{sensor.name}: labels"):
@@ -282,6 +295,19 @@ def _raw_document(raw: RawImage, model: SensorModel, radiance: RadianceImage) ->
             ratio = np.divide(monte_carlo_e, noise_e, out=np.zeros_like(mean_e), where=noise_e > 0)
             document["noise_ratio_rms"] = float(np.sqrt(np.mean(ratio**2)))
     return document
+
+
+def _isp_document(display: DisplayImage) -> dict[str, Any]:
+    """Return what made colours of the channels, and how much noise that costs in the dark."""
+    calibration, matrix = display.calibration, display.colour_matrix
+    return {
+        "illuminant": calibration.illuminant.source,
+        "illuminant_xy": calibration.illuminant_xy,
+        "channels": list(calibration.channel_names),
+        "channel_gain_ratio": display.channel_gain_ratio.tolist(),
+        "colour_matrix": None if matrix is None else matrix.tolist(),
+        "noise_amplification": calibration.noise_amplification,
+    }
 
 
 def _lens_document(camera: Camera) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from fullwell.schema.frame import CameraRig, FrameDescription
 __all__ = ["FramePlan", "PlanStep", "plan_document", "plan_frame"]
 
 _DISPLAY = frozenset({"image.png"})
-_SENSOR = _DISPLAY | {"raw.npz", "raw.tiff"}
+_SENSOR = _DISPLAY | {"raw.npz", "raw.tiff", "raw.dng"}
 _OPTICAL = _SENSOR | {"irradiance.exr"}
 _RADIANCE = _OPTICAL | {"radiance.exr"}
 _LABELS = frozenset({"depth.exr", "normals.exr", "instances.png", "semantic.png", "labels.json"})

@@ -15,6 +15,7 @@ PRODUCTS: tuple[str, ...] = (
     "image.png",
     "raw.npz",
     "raw.tiff",
+    "raw.dng",
     "radiance.exr",
     "irradiance.exr",
     "depth.exr",

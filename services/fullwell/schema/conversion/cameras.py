@@ -4,25 +4,38 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fullwell.core.errors import FieldError
-from fullwell.isp.parameters import IspSettings
+from fullwell.isp.demosaic import check_demosaic
+from fullwell.isp.parameters import ColourMatrixFit, IspSettings, ToneCurve
+from fullwell.radiometry import Spectrum
 from fullwell.scene import Camera, Film, Lens
 from fullwell.scene.camera import look_at
 from fullwell.schema.conversion.context import Context, fail, located
 from fullwell.schema.conversion.spectra import reflectance_of, spd_of
 from fullwell.schema.errors import RecipeError
 from fullwell.schema.frame import CameraRig, SensorRig
-from fullwell.schema.v1.cameras import CameraDocument, ExposureDocument, LensDocument, PoseDocument, SensorDocument
+from fullwell.schema.v1.cameras import (
+    CameraDocument,
+    ExposureDocument,
+    LensDocument,
+    PoseDocument,
+    SensorDocument,
+    ToneDocument,
+)
 from fullwell.sensor.parameters import AutoExposure, Exposure, FixedExposure, SensorModel
 
 __all__ = ["MAX_FILM_BYTES", "MAX_FILM_SAMPLES", "camera_rig"]
 
 MAX_FILM_SAMPLES = 64_000_000
 MAX_FILM_BYTES = 8 * 2**30
+SCENE_LIGHT = "scene"
+"""The name in `isp.illuminant` of the light that the scene's own lights give."""
+
 _RIGID_TOLERANCE = 1e-6
 
 
@@ -33,7 +46,7 @@ def camera_rig(document: CameraDocument, path: str, oversampling: int, context: 
     film = _film(models, path, oversampling, context)
     lens = _lens(document, f"{path}.lens", models[0], context)
     sensors = [
-        SensorRig(sensor.name, model, _exposure(sensor.exposure), _isp(sensor, f"{path}.sensors[{i}].isp", context))
+        SensorRig(sensor.name, model, _exposure(sensor.exposure), _isp(sensor, model, f"{path}.sensors[{i}].isp", context))
         for i, (sensor, model) in enumerate(zip(document.sensors, models, strict=True))
     ]
     return CameraRig(Camera(document.name, pose, lens, film), tuple(sensors))
@@ -125,7 +138,27 @@ def _exposure(document: ExposureDocument) -> Exposure:
     return AutoExposure(auto.method, auto.level, auto.percentile, auto.min_time_s, auto.max_time_s)
 
 
-def _isp(document: SensorDocument, path: str, context: Context) -> IspSettings:
+def _isp(document: SensorDocument, model: SensorModel, path: str, context: Context) -> IspSettings:
+    isp = document.isp
+    with located(f"{path}.demosaic"):
+        check_demosaic(isp.demosaic, model.cfa.pattern)
+    return IspSettings(
+        _isp_light(isp.illuminant, f"{path}.illuminant", context),
+        isp.white_balance,
+        isp.demosaic,
+        isp.white_patch_percentile,
+        ColourMatrixFit(isp.colour_matrix.method, isp.colour_matrix.noise_fraction),
+        _tone(isp.tone),
+    )
+
+
+def _tone(tone: ToneDocument) -> ToneCurve:
+    return ToneCurve(tone.curve, tone.exposure_ev, tone.black_point, tone.gamma, tone.contrast, tone.pivot)
+
+
+def _isp_light(given: Any, path: str, context: Context) -> Spectrum | None:
+    """Return the light that becomes white; None is the scene's own, which is known only when the scene is built."""
+    if isinstance(given, str) and given.strip().casefold() == SCENE_LIGHT:
+        return None
     quiet = dataclasses.replace(context, warnings=[])  # that an illuminant's table ends changes no radiance here
-    illuminant = spd_of(document.isp.illuminant, f"{path}.illuminant", quiet)
-    return IspSettings(illuminant, document.isp.white_balance, document.isp.demosaic)
+    return spd_of(given, path, quiet)

@@ -27,11 +27,13 @@ from fullwell.schema.v1.spectra import Reflectance, Spd
 __all__ = [
     "AutoExposureDocument",
     "CameraDocument",
+    "ColourMatrixDocument",
     "ExposureDocument",
     "IspDocument",
     "LensDocument",
     "PoseDocument",
     "SensorDocument",
+    "ToneDocument",
 ]
 
 MAX_SIDE_PX = 20_000
@@ -108,12 +110,33 @@ class ExposureDocument(Document):
         return self
 
 
-class IspDocument(Document):
-    """From raw numbers to a picture; `illuminant` is the light that becomes white."""
+class ColourMatrixDocument(Document):
+    """How the colour matrix is fitted; `noise_fraction`, of the saturation signal, is for "noise_aware"."""
 
-    illuminant: Spd = "d65"
-    white_balance: Literal["illuminant", "gray_world", "none"] = "illuminant"
-    demosaic: Literal["bilinear"] = "bilinear"
+    method: Literal["least_squares", "noise_aware"] = "least_squares"
+    noise_fraction: Annotated[float, Range(ge=0, le=1)] = 0.02
+
+
+class ToneDocument(Document):
+    """The tone curve; `gamma` is for "gamma", `contrast` and `pivot` are for "s_curve"."""
+
+    curve: Literal["srgb", "linear", "gamma", "filmic", "s_curve"] = "srgb"
+    exposure_ev: Annotated[float, Range(ge=-20, le=20)] = 0.0
+    black_point: Annotated[float, Range(ge=0, lt=1)] = 0.0
+    gamma: Annotated[float, Range(ge=0.1, le=10)] = 2.2
+    contrast: Annotated[float, Range(ge=0.1, le=10)] = 1.5
+    pivot: Annotated[float, Range(ge=0.001, le=0.999)] = 0.5
+
+
+class IspDocument(Document):
+    """From raw numbers to a picture; `illuminant` is the light that becomes white, "scene" that of the scene's own lights."""
+
+    illuminant: Spd = "scene"
+    white_balance: Literal["illuminant", "gray_world", "white_patch", "none"] = "illuminant"
+    white_patch_percentile: Annotated[float, Range(gt=0, le=100)] = 99.0
+    demosaic: Literal["bilinear", "malvar2004", "menon2007"] = "bilinear"
+    colour_matrix: ColourMatrixDocument = Field(default_factory=ColourMatrixDocument)
+    tone: ToneDocument = Field(default_factory=ToneDocument)
 
 
 class SensorDocument(Document):

@@ -32,6 +32,7 @@ _PRODUCTS = (
     "image.png",
     "raw.npz",
     "raw.tiff",
+    "raw.dng",
     "radiance.exr",
     "irradiance.exr",
     "depth.exr",
