@@ -358,6 +358,7 @@ def _read_photodiode(
             Capture(
                 group=timing.group,
                 dn=digitised.dn,
+                saturated=digitised.saturated,
                 black_level_dn=black_level_of(model),
                 white_level_dn=white_level_dn(model),
                 electrons_per_dn=step_e,

@@ -28,8 +28,8 @@ class Capture:
     ----------
     group
         Captures of one group hold the same electrons (several readouts of one photodiode).
-    dn
-        (rows, cols) [DN].
+    dn, saturated
+        (rows, cols) [DN], and where the well was full or the ADC at its full scale.
     black_level_dn, white_level_dn
         Of this capture, not rounded.
     electrons_per_dn
@@ -43,6 +43,7 @@ class Capture:
 
     group: int
     dn: NDArray[np.uint16]
+    saturated: NDArray[np.bool_]
     black_level_dn: float
     white_level_dn: float
     electrons_per_dn: float
@@ -160,13 +161,12 @@ def _digitised(
         white_dn = most_levels
     bits = max(1, math.ceil(math.log2(white_dn + 1.0)))
     dn = np.rint(np.clip(signal_e / step_e + black_dn, 0.0, white_dn))
-    saturated = last.dn >= last.white_level_dn - 0.5
     return Combined(
         dn=dn.astype(np.uint16) if bits <= 16 else dn.astype(np.uint32),
         black_level_dn=black_dn,
         white_level_dn=white_dn,
         electrons_per_dn=step_e,
         bits=bits,
-        saturated_fraction=float(np.mean(saturated)),
+        saturated_fraction=float(np.mean(last.saturated)),
         used_fractions=tuple(float(np.mean(part)) for part in used),
     )
