@@ -318,10 +318,11 @@ def decode_raw_npz(content: bytes) -> RawImage:
         adc_bits=metadata["adc_bits"],
         saturated_fraction=metadata["saturated_fraction"],
         mean_electrons=arrays.get("mean_electrons"),
-        line_time_s=metadata["line_time_s"],
-        electrons_per_dn=metadata["electrons_per_dn"],
-        channel_exposure_time_s=tuple((name, time_s) for name, time_s in metadata["channel_exposure_time_s"]),
-        captures=tuple(CaptureRecord(**entry) for entry in metadata["captures"]),
+        # Archives from before there were captures lack these.
+        line_time_s=metadata.get("line_time_s", 0.0),
+        electrons_per_dn=metadata.get("electrons_per_dn", 0.0),
+        channel_exposure_time_s=tuple((name, time_s) for name, time_s in metadata.get("channel_exposure_time_s", ())),
+        captures=tuple(CaptureRecord(**entry) for entry in metadata.get("captures", ())),
     )
 
 
