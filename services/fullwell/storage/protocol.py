@@ -26,6 +26,7 @@ MAX_SEGMENT_BYTES = 200
 _CONTENT_TYPES = {
     ".bin": "application/octet-stream",
     ".csv": "text/csv",
+    ".dng": "image/x-adobe-dng",
     ".exr": "image/x-exr",
     ".glb": "model/gltf-binary",
     ".gltf": "model/gltf+json",
