@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.metadata
 import time
 from collections.abc import Iterator
@@ -28,7 +29,7 @@ from fullwell.render import RenderStatistics, choose_variant, query_surfaces, re
 from fullwell.scene import Camera, Film
 from fullwell.scene.images import OpticalImage, RawImage
 from fullwell.schema.frame import CameraRig, FrameDescription, SensorRig
-from fullwell.sensor import SensorModel, expose, fixed_pattern_stream
+from fullwell.sensor import SensorModel, dark_noise_e, expose, fixed_pattern_stream, reference_model
 from fullwell.storage import ObjectStore
 
 __all__ = ["MANIFEST_NAME", "MANIFEST_SCHEMA", "render_frame"]
@@ -285,16 +286,36 @@ def _raw_document(raw: RawImage, model: SensorModel, radiance: RadianceImage) ->
         "black_level_dn": raw.black_level_dn,
         "white_level_dn": raw.white_level_dn,
         "saturated_fraction": raw.saturated_fraction,
+        "electrons_per_dn": raw.electrons_per_dn,
+        "serial": model.serial,
+        "temperature_k": model.temperature_k,
+        "shutter": _shutter_document(raw),
     }
+    if raw.channel_exposure_time_s:
+        document["channel_exposure_time_s"] = dict(raw.channel_exposure_time_s)
+    if raw.captures:
+        document["captures"] = [dataclasses.asdict(record) for record in raw.captures]
     if raw.mean_electrons is not None:
         mean_e = raw.mean_electrons.astype(np.float64)
         document["mean_electrons"] = float(mean_e.mean())
         if radiance.standard_error is not None and radiance.standard_error.shape == mean_e.shape:
-            noise_e = np.sqrt(mean_e + model.read_noise_e**2)
+            noise_e = np.sqrt(mean_e + dark_noise_e(reference_model(model)) ** 2)
             monte_carlo_e = radiance.standard_error * mean_e
             ratio = np.divide(monte_carlo_e, noise_e, out=np.zeros_like(mean_e), where=noise_e > 0)
             document["noise_ratio_rms"] = float(np.sqrt(np.mean(ratio**2)))
     return document
+
+
+def _shutter_document(raw: RawImage) -> dict[str, Any]:
+    """Return when the rows were exposed: row r starts at r times the line time after the first, of each capture."""
+    return {
+        "kind": "rolling" if raw.line_time_s > 0 else "global",
+        "line_time_s": raw.line_time_s,
+        "first_row_start_s": float(raw.row_start_s[0]),
+        "last_row_start_s": float(raw.row_start_s[-1]),
+        "first_row_middle_s": float(raw.row_middle_s[0]),
+        "last_row_middle_s": float(raw.row_middle_s[-1]),
+    }
 
 
 def _isp_document(display: DisplayImage) -> dict[str, Any]:

@@ -16,18 +16,18 @@ from fullwell.radiometry import Spectrum
 from fullwell.scene import Camera, Film, Lens
 from fullwell.scene.camera import look_at
 from fullwell.schema.conversion.context import Context, fail, located
+from fullwell.schema.conversion.sensors import exposure_of, sensor_model
 from fullwell.schema.conversion.spectra import reflectance_of, spd_of
 from fullwell.schema.errors import RecipeError
 from fullwell.schema.frame import CameraRig, SensorRig
 from fullwell.schema.v1.cameras import (
     CameraDocument,
-    ExposureDocument,
     LensDocument,
     PoseDocument,
     SensorDocument,
     ToneDocument,
 )
-from fullwell.sensor.parameters import AutoExposure, Exposure, FixedExposure, SensorModel
+from fullwell.sensor.parameters import SensorModel
 
 __all__ = ["MAX_FILM_BYTES", "MAX_FILM_SAMPLES", "camera_rig"]
 
@@ -42,11 +42,16 @@ _RIGID_TOLERANCE = 1e-6
 def camera_rig(document: CameraDocument, path: str, oversampling: int, context: Context) -> CameraRig:
     """Return the camera and the sensors behind its lens; raises RecipeError where they are too large to render."""
     pose = _pose(document.pose, f"{path}.pose")
-    models = [_sensor_model(sensor, f"{path}.sensors[{i}]") for i, sensor in enumerate(document.sensors)]
+    models = [sensor_model(sensor, f"{path}.sensors[{i}]", context) for i, sensor in enumerate(document.sensors)]
     film = _film(models, path, oversampling, context)
     lens = _lens(document, f"{path}.lens", models[0], context)
     sensors = [
-        SensorRig(sensor.name, model, _exposure(sensor.exposure), _isp(sensor, model, f"{path}.sensors[{i}].isp", context))
+        SensorRig(
+            sensor.name,
+            model,
+            exposure_of(sensor.exposure, model, f"{path}.sensors[{i}].exposure"),
+            _isp(sensor, model, f"{path}.sensors[{i}].isp", context),
+        )
         for i, (sensor, model) in enumerate(zip(document.sensors, models, strict=True))
     ]
     return CameraRig(Camera(document.name, pose, lens, film), tuple(sensors))
@@ -73,14 +78,6 @@ def _rigid(matrix: NDArray[np.float64], path: str) -> NDArray[np.float64]:
     if not np.array_equal(matrix[3], [0, 0, 0, 1]):
         fail(path, f"has the last row {matrix[3].tolist()}; must be [0, 0, 0, 1].")
     return matrix
-
-
-def _sensor_model(document: SensorDocument, path: str) -> SensorModel:
-    from fullwell.sensor.catalogue import sensor  # noqa: PLC0415 - the catalogue reads tables
-
-    with located(f"{path}.model"):
-        model = sensor(document.model, path=f"{path}.model")
-    return dataclasses.replace(model, **document.overrides())  # type: ignore[arg-type]
 
 
 def _film(models: list[SensorModel], path: str, oversampling: int, context: Context) -> Film:
@@ -129,13 +126,6 @@ def _focus_distance_m(lens: LensDocument, pose: PoseDocument) -> float:
     if lens.kind == "pinhole" or pose.origin_m is None or pose.target_m is None:
         return math.inf
     return math.dist(pose.origin_m, pose.target_m)
-
-
-def _exposure(document: ExposureDocument) -> Exposure:
-    if document.auto is None:
-        return FixedExposure(float(document.time_s or 0.0))
-    auto = document.auto
-    return AutoExposure(auto.method, auto.level, auto.percentile, auto.min_time_s, auto.max_time_s)
 
 
 def _isp(document: SensorDocument, model: SensorModel, path: str, context: Context) -> IspSettings:

@@ -14,6 +14,7 @@ from fullwell.schema.v1.common import (
     MatrixRows,
     Name,
     NonNegative,
+    Number,
     Point,
     Positive,
     PositiveOrInf,
@@ -21,6 +22,14 @@ from fullwell.schema.v1.common import (
     Text,
     exactly_one,
     refuse,
+)
+from fullwell.schema.v1.sensors import (
+    AutoExposureDocument,
+    CfaDocument,
+    CrosstalkDocument,
+    ExposureDocument,
+    MicrolensDocument,
+    PhotodiodeDocument,
 )
 from fullwell.schema.v1.spectra import Reflectance, Spd
 
@@ -82,34 +91,6 @@ class LensDocument(Document):
         return self
 
 
-class AutoExposureDocument(Document):
-    """Exposure time found from the noise-free image; `level` is a fraction of the full well."""
-
-    method: Literal["full", "mean", "percentile"] = "percentile"
-    level: Annotated[float, Range(gt=0, le=10)] = 0.7
-    percentile: Annotated[float, Range(gt=0, le=100)] = 99.0
-    min_time_s: Positive = 1e-6
-    max_time_s: Positive = 1.0
-
-    @model_validator(mode="after")
-    def _ordered(self) -> AutoExposureDocument:
-        if self.min_time_s > self.max_time_s:
-            refuse(f"is {self.min_time_s:g}; must be <= max_time_s, {self.max_time_s:g}.", "min_time_s", value=self.min_time_s)
-        return self
-
-
-class ExposureDocument(Document):
-    """A fixed `time_s`, or `auto`."""
-
-    time_s: Annotated[float, Range(gt=0, le=86400)] | None = None
-    auto: AutoExposureDocument | None = None
-
-    @model_validator(mode="after")
-    def _one(self) -> ExposureDocument:
-        exactly_one(self, "time_s", "auto")
-        return self
-
-
 class ColourMatrixDocument(Document):
     """How the colour matrix is fitted; `noise_fraction`, of the saturation signal, is for "noise_aware"."""
 
@@ -140,7 +121,7 @@ class IspDocument(Document):
 
 
 class SensorDocument(Document):
-    """A sensor of the catalogue; any of its numbers may be given instead of the catalogue's."""
+    """A sensor of the catalogue; anything that describes it may be given instead of the catalogue's."""
 
     name: Name = "main"
     model: Text = "imx363"
@@ -162,10 +143,56 @@ class SensorDocument(Document):
     adc_bits: Annotated[int, Range(ge=1, le=16, whole=True)] | None = None
     serial: Annotated[int, Range(ge=0, le=2**53, whole=True)] | None = None
 
-    def overrides(self) -> dict[str, int | float]:
-        """Return the numbers of the catalogue's model that the recipe replaces."""
-        own = {"name", "model", "exposure", "isp"}
-        return {key: value for key, value in self if key not in own and value is not None}
+    array_rows: _Side | None = None
+    array_cols: _Side | None = None
+    cfa: CfaDocument | None = None
+    microlens: MicrolensDocument | None = None
+    crosstalk: CrosstalkDocument | None = None
+    photodetector_offset_m: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
+    temperature_k: Annotated[float, Range(ge=50, le=500)] | None = None
+    dark_reference_temperature_k: Annotated[float, Range(ge=50, le=500)] | None = None
+    dark_doubling_k: Annotated[float, Range(ge=0.1, le=1000)] | None = None
+    dark_activation_energy_ev: Annotated[float, Range(gt=0, le=10)] | None = None
+    dcnu_fraction: NonNegative | None = None
+    hot_pixel_fraction: Fraction | None = None
+    hot_pixel_dark_current_e_per_s: NonNegative | None = None
+    reset_noise_e: NonNegative | None = None
+    readout_sampling: Literal["single", "correlated_double"] | None = None
+    column_offset_v: NonNegative | None = None
+    row_offset_v: NonNegative | None = None
+    column_gain_fraction: NonNegative | None = None
+    row_noise_v: NonNegative | None = None
+    line_time_s: Annotated[float, Range(ge=0, le=1)] | None = None
+    photodiodes: list[PhotodiodeDocument] | None = Field(default=None, max_length=8)
+    combination: Literal["weighted", "select"] | None = None
+
+    @model_validator(mode="after")
+    def _one_dark_law(self) -> SensorDocument:
+        if self.dark_doubling_k is not None and self.dark_activation_energy_ev is not None:
+            refuse("is given beside dark_doubling_k; give one of them.", "dark_activation_energy_ev")
+        return self
+
+    def overrides(self) -> dict[str, int | float | str]:
+        """Return the numbers and choices of the catalogue's model that the recipe replaces as they are."""
+        return {key: value for key, value in self if key not in _MADE and value is not None}
+
+
+_MADE = frozenset(
+    {
+        "name",
+        "model",
+        "exposure",
+        "isp",
+        "cfa",
+        "microlens",
+        "crosstalk",
+        "photodetector_offset_m",
+        "dark_doubling_k",
+        "dark_activation_energy_ev",
+        "photodiodes",
+    }
+)
+"""Keys of a sensor that something is made of, or that are not the model's."""
 
 
 class CameraDocument(Document):
