@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,8 +12,14 @@ from fastapi.testclient import TestClient
 from standins import RememberingQueue
 
 from fullwell.core.settings import Settings
+from fullwell.jobs.logs import configure_logs
 from fullwell_api.app import create_app
 from fullwell_api.services import Services
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _plain_logs() -> None:
+    configure_logs(level=logging.ERROR)
 
 
 @pytest.fixture

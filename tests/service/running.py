@@ -56,7 +56,7 @@ class RunningService:
             "FULLWELL_LEASE_S": "3",
             "FULLWELL_REAP_INTERVAL_S": "0.3",
             "FULLWELL_RETRY_DELAY_S": "0.1",
-            "FULLWELL_SOFT_SHUTDOWN_S": "5",
+            "FULLWELL_SOFT_SHUTDOWN_S": "2",
         }
         self.client = FullwellClient(f"http://127.0.0.1:{port}", patience_s=30.0)
         self.processes: list[subprocess.Popen[bytes]] = []

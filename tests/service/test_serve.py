@@ -32,7 +32,7 @@ def fullwell(home: Path, *arguments: str, seconds: float = 60.0) -> subprocess.C
 
 def environment(home: Path) -> dict[str, str]:
     kept = {name: value for name, value in os.environ.items() if not name.startswith("FULLWELL_")}
-    return kept | {"FULLWELL_HOME": str(home), "FULLWELL_REAP_INTERVAL_S": "0.3", "FULLWELL_SOFT_SHUTDOWN_S": "3"}
+    return kept | {"FULLWELL_HOME": str(home), "FULLWELL_REAP_INTERVAL_S": "0.3", "FULLWELL_SOFT_SHUTDOWN_S": "2"}
 
 
 def family_of(pid: int) -> list[int]:

@@ -8,7 +8,7 @@ import socket
 import subprocess
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -18,17 +18,19 @@ from celery import Celery, Task, signals
 from celery.apps.worker import Worker
 from celery.exceptions import Reject
 from celery.worker.request import Request
+from kombu.asynchronous import get_event_loop
 
 from fullwell.core import FullwellError, ServiceError
 from fullwell.core.settings import Settings
 from fullwell.jobs.children import die_with_parent
 from fullwell.jobs.database import Database
-from fullwell.jobs.queue import RENDER_TASK, celery_application
+from fullwell.jobs.queue import RENDER_TASK, CeleryTaskQueue, TaskQueue, celery_application
 from fullwell.jobs.repository import JobRepository
 from fullwell.storage import store_from_url
 from fullwell_worker import health
 from fullwell_worker.execution import CurrentJob, WorkerContext, run_frames
 from fullwell_worker.loss import Loss, record_loss_in_a_process
+from fullwell_worker.watchdog import Watchdog
 
 __all__ = ["QueueWorker", "wait_for_schema"]
 
@@ -51,9 +53,9 @@ class _Processes:
     def __init__(self, settings: Settings, name: str) -> None:
         self.settings = settings
         self.name = name
-        # Two bytes that the main process and its children share: whether the worker was asked to end, and whether a
-        # child runs a frame.
-        self._flags = mmap.mmap(-1, 2)
+        # Three bytes that the main process and its children share: whether the worker was asked to end, whether a child
+        # runs a frame, and a count of messages that runs over.
+        self._flags = mmap.mmap(-1, 3)
         self._pid = 0
         self._context: WorkerContext | None = None
 
@@ -70,12 +72,17 @@ class _Processes:
         """Whether a child runs a frame."""
         return self._flags[1] != 0
 
+    def idle_since_message(self) -> int | None:
+        """Return the count of messages while the worker should be taking the next one, None otherwise."""
+        return None if self.busy or self.leaving else self._flags[2]
+
     def rest(self) -> None:
         self._flags[1] = 0
 
     @contextmanager
     def working(self) -> Iterator[None]:
         self._flags[1] = 1
+        self._flags[2] = (self._flags[2] + 1) % 256
         try:
             yield
         finally:
@@ -100,7 +107,7 @@ class QueueWorker:
         self.application = celery_application(settings, broker_url)
         self.application.Worker = self.application.subclass_with_self(_worker_class(self._processes))
         _add_task(self.application, self._processes)
-        _add_handlers(self._processes)
+        _add_handlers(self._processes, CeleryTaskQueue(settings, broker_url))
 
     def run(self) -> None:
         """Take frames until the process is asked to end."""
@@ -150,6 +157,18 @@ def _add_task(application: Celery, processes: _Processes) -> None:
                 _record_loss(processes, self, f"the time limit of {timeout:g} s was exceeded")
             return super().on_timeout(soft, timeout)
 
+        acknowledged: bool
+
+        def acknowledge(self) -> None:
+            if not self.acknowledged:
+                self.acknowledged = True
+                _answer(self.message.ack)
+
+        def reject(self, requeue: bool = False) -> None:
+            if not self.acknowledged:
+                self.acknowledged = True
+                _answer(self.message.reject, requeue)
+
     class FrameTask(Task):  # type: ignore[misc]
         Request = FrameRequest
         max_retries = 2
@@ -171,6 +190,19 @@ def _add_task(application: Celery, processes: _Processes) -> None:
             log.warning("message dropped", job=job_id, cause=str(error))
 
 
+def _answer(answer: Callable[..., object], *arguments: object) -> None:
+    """Answer a message in the event loop's next round, and let a broken connection's error come through to the loop.
+
+    Celery's own way logs that error and goes on with connections that the broker has closed: now and then such a worker
+    never took another message. An error that reaches the loop makes it connect anew.
+    """
+    loop = get_event_loop()
+    if loop is None:
+        answer(*arguments)
+    else:
+        loop.call_soon(answer, *arguments)
+
+
 def _record_loss(processes: _Processes, request: Any, cause: str) -> None:
     if processes.leaving or getattr(request, "_already_cancelled", False):
         return  # an orderly end: the frames are given back when the last child has ended
@@ -182,7 +214,7 @@ def _record_loss(processes: _Processes, request: Any, cause: str) -> None:
         log.warning("loss not recorded", cause=str(error))
 
 
-def _add_handlers(processes: _Processes) -> None:
+def _add_handlers(processes: _Processes, queue: TaskQueue) -> None:
     file = processes.settings.health_file
     parent = os.getpid()
 
@@ -199,6 +231,7 @@ def _add_handlers(processes: _Processes) -> None:
     @signals.worker_ready.connect(weak=False)  # type: ignore[untyped-decorator]
     def _ready(**_: Any) -> None:
         health.beat(file)
+        Watchdog(queue, processes.idle_since_message).start()
 
 
 def _beat_forever(processes: _Processes) -> None:

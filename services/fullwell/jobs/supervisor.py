@@ -35,6 +35,7 @@ STABLE_S: Final = 10.0
 LONGEST_PAUSE_S: Final = 30.0
 MAX_LOG_BYTES: Final = 20 << 20
 LOG_CHECK_S: Final = 60.0
+SILENCE_S: Final = 120.0
 SOCKET_PATH_BYTES: Final = 100
 """A unix socket's path must fit into 108 bytes; a home folder deep down gets its socket in the temporary folder."""
 
@@ -223,6 +224,7 @@ class _Service:
                 continue
             code = child.exit_code()
             if code is None:
+                self._end_if_silent(child, now)
                 continue
             # At once after a long life; ever later when it dies again and again.
             lived_s = now - child.started_at
@@ -234,6 +236,17 @@ class _Service:
             self._next_log_check = now + LOG_CHECK_S
             for child in self._children:
                 _shorten(child.log_file)
+
+    def _end_if_silent(self, child: _Child, now: float) -> None:
+        """Kill a worker whose event loop has stopped: its health file, touched every few seconds, has grown old."""
+        health_file = child.environment.get("FULLWELL_WORKER_HEALTH_FILE") if child.name.startswith("worker") else None
+        if health_file is None or child.process is None or now - child.started_at < SILENCE_S:
+            return
+        with contextlib.suppress(OSError):
+            silence_s = time.time() - Path(health_file).stat().st_mtime
+            if silence_s > SILENCE_S:
+                self._say(f"{child.name} gave no sign of life for {silence_s:.0f} s")
+                child.process.kill()
 
     # -- end ----------------------------------------------------------------------------------------------------------
 
