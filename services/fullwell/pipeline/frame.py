@@ -73,6 +73,9 @@ def render_frame(
     for position, rig in enumerate(frame.cameras):
         _camera_products(run, rig, position)
     run.report("store", 0.98)
+    published = _published(store, prefix, digest)
+    if published is not None:  # a late duplicate must not touch the products of a frame that is committed
+        return published
     listing = []
     for name in sorted(run.products):
         content = run.products[name]
