@@ -104,9 +104,8 @@ def main() -> None:
     print(f"radiance {ROWS} x {COLS} x {radiance.grid.count} -> raw {raw.rows} x {raw.cols}, median of {arguments.repeats}\n")
     for name, seconds in steps.items():
         print(f"{name:36s} {seconds:7.3f} CPU-s  {100 * seconds / whole:5.1f} %")
-    print(
-        f"{'whole chain':36s} {whole:7.3f} CPU-s   (aim {AIM_CPU_S}; ISETCam about {ISETCAM_CPU_S:g}: {ISETCAM_CPU_S / whole:.0f} x)"
-    )
+    ratio = ISETCAM_CPU_S / whole
+    print(f"{'whole chain':36s} {whole:7.3f} CPU-s   (aim {AIM_CPU_S}; ISETCam about {ISETCAM_CPU_S:g}: {ratio:.0f} x)")
     print(f"{'one of ten exposures behind the lens':36s} {sweep / 10:7.3f} CPU-s   (aim {AIM_SWEEP_CPU_S})")
     if arguments.json:
         document = {"steps_cpu_s": steps, "whole_cpu_s": whole, "sweep_each_cpu_s": sweep / 10}
