@@ -374,7 +374,7 @@ def _draw_semantic(panel: Image.Image, frame: _Frame) -> None:
 # Arrays --------------------------------------------------------------------------------------------------------------
 
 
-def _raw(frame: _Frame) -> tuple[NDArray[np.uint16], Mapping[str, Any]]:
+def _raw(frame: _Frame) -> tuple[NDArray[np.uint16] | NDArray[np.uint32], Mapping[str, Any]]:
     if "raw.tiff" in frame.products and "raw.npz" not in frame.products:
         return decode_raw_tiff(frame.products["raw.tiff"])
     raw = decode_raw_npz(frame.products["raw.npz"])

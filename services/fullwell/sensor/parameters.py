@@ -47,6 +47,10 @@ MAX_WELL_CAPACITY_E: Final = 1e9
 ReadoutSampling = Literal["single", "correlated_double"]
 
 
+_ROUNDING = 1e-9
+"""Share of the pitch by which rounding may push a photodetector that fills its pixel over the edge."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ColorFilterArray:
     """The repeating pattern of channels.
@@ -253,7 +257,7 @@ class SensorModel:
         places = [(photodiode.offset_m, photodiode.fill_factor) for photodiode in self.photodiodes]
         for offset_m, fill_factor in places or [(None, self.fill_factor)]:
             reach = max(abs(d) for d in offset_m or self.photodetector_offset_m) + 0.5 * self.pixel_pitch_m * fill_factor**0.5
-            if not reach <= 0.5 * self.pixel_pitch_m * (1 + 1e-9):
+            if not reach <= 0.5 * self.pixel_pitch_m * (1 + _ROUNDING):
                 raise refusal(
                     "photodetector_offset_m",
                     offset_m or self.photodetector_offset_m,
