@@ -29,10 +29,9 @@ from fullwell.sensor.hot_pixels import dark_current_map, mean_dark_current
 from fullwell.sensor.model import (
     READOUT_STREAMS,
     black_level_of,
-    collect_electrons,
     dark_noise_e,
-    digitise,
     electrons_per_dn,
+    expose_and_digitise,
     photo_electron_rate,
     read_out,
     white_level_dn,
@@ -229,8 +228,9 @@ def _stored(dn: NDArray[np.float64], bits: int) -> NDArray[np.uint16] | NDArray[
     return rounded.astype(np.uint16) if bits <= 16 else rounded.astype(np.uint32)
 
 
-def _channel_times_s(sensor: SensorModel, time_s: float, exposure: ChannelExposure) -> dict[str, float]:
-    """Return the exposure time of each channel that the pattern uses [s]."""
+def _channel_times_s(job: _Job, time_s: float, exposure: ChannelExposure) -> dict[str, float]:
+    """Return the exposure time of each channel that the pattern uses and the sensor has pixels of [s]."""
+    sensor = job.sensor
     if sensor.photodiodes:
         raise FieldError(
             f"channel_ratios are given for {sensor.name}, which has several readouts; use a bracket or another sensor.",
@@ -241,21 +241,31 @@ def _channel_times_s(sensor: SensorModel, time_s: float, exposure: ChannelExposu
     for name, _ in exposure.ratios:
         if name not in names:
             raise FieldError(unknown_name_message("channel", name, names), path="channel_ratios", value=name)
-    ratios, used = dict(exposure.ratios), {name for row in sensor.cfa.pattern for name in row}
-    return {name: time_s * ratios.get(name, 1.0) for name in names if name in used}
+    index = channel_index_map(sensor.cfa, rows=sensor.rows, cols=sensor.cols)
+    used = [int(k) for k in np.unique(index)]
+    if not exposure.ratios:
+        return {names[k]: exposure_time_for_rate(job.rate[index == k][None], sensor, exposure.base) for k in used}
+    ratios = dict(exposure.ratios)
+    return {names[k]: time_s * ratios.get(names[k], 1.0) for k in used}
 
 
 def _channels(job: _Job, time_s: float, exposure: ChannelExposure) -> RawImage:
     """Return the picture with a time for each channel, its values multiplied up to the longest."""
     sensor = job.sensor
-    times_s = _channel_times_s(sensor, time_s, exposure)
+    times_s = _channel_times_s(job, time_s, exposure)
     longest_s = max(times_s.values())
     index = channel_index_map(sensor.cfa, rows=sensor.rows, cols=sensor.cols)
     time_map_s = np.array([times_s.get(name, longest_s) for name in sensor.cfa.channel_names])[index]
     (pattern,) = fixed_patterns(sensor, job.fixed_pattern_rng, 1)
     shot_rng, *readout_rngs = split_generator(job.rng, 1 + READOUT_STREAMS)
-    electrons = collect_electrons(job.rate, sensor, time_map_s, pattern=pattern, rng=shot_rng)
-    digitised = digitise(electrons, sensor, pattern=pattern, rngs=tuple(readout_rngs))
+    (digitised,) = expose_and_digitise(
+        job.rate,
+        sensor,
+        time_map_s,
+        pattern=pattern,
+        shot_rng=shot_rng,
+        readouts=((sensor, tuple(readout_rngs)),),
+    )
     black_dn = black_level_of(sensor)
     up = longest_s / time_map_s
     most_dn = black_dn + (full_scale_dn(sensor.adc_bits) - black_dn) * float(np.max(up))
@@ -349,10 +359,17 @@ def _read_photodiode(
     """Collect a photodiode's electrons once and yield what each of its readouts makes of them."""
     shot_rng, *readout_rngs = split_generator(rng, 1 + len(photodiode.readouts))
     whole_well = readout_model(sensor, photodiode, replace(photodiode.readouts[0], well_capacity_e=math.inf))
-    electrons = collect_electrons(rate, whole_well, timing.time_s, pattern=pattern, rng=shot_rng)
-    for readout, readout_rng in zip(photodiode.readouts, readout_rngs, strict=True):
-        model = readout_model(sensor, photodiode, readout)
-        digitised = digitise(electrons, model, pattern=pattern, rngs=split_generator(readout_rng, READOUT_STREAMS))
+    models = [readout_model(sensor, photodiode, readout) for readout in photodiode.readouts]
+    streams = [split_generator(readout_rng, READOUT_STREAMS) for readout_rng in readout_rngs]
+    readings = expose_and_digitise(
+        rate,
+        whole_well,
+        timing.time_s,
+        pattern=pattern,
+        shot_rng=shot_rng,
+        readouts=tuple(zip(models, streams, strict=True)),
+    )
+    for readout, model, digitised in zip(photodiode.readouts, models, readings, strict=True):
         step_e = electrons_per_dn(model)
         yield (
             Capture(

@@ -136,15 +136,19 @@ class BurstExposure:
 class ChannelExposure:
     """Each channel with its own time in the same capture, `ratios` (name, number) times the time of `base`.
 
-    Channels without a ratio have 1. The longest is the reference: the values of the others are multiplied up to it.
+    Channels without a ratio have 1. Without any ratios each channel finds its own time by itself; `base` is then an automatic
+    exposure by "full", "mean" or "percentile". The longest is the reference: the values of the others are multiplied up to it.
     """
 
     base: SingleExposure
-    ratios: tuple[tuple[str, float], ...]
+    ratios: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
-        if not self.ratios or not all(0 < ratio < math.inf for _, ratio in self.ratios):
-            raise _refuse("channel_ratios", self.ratios, "one or more numbers > 0 and finite")
+        if not all(0 < ratio < math.inf for _, ratio in self.ratios):
+            raise _refuse("channel_ratios", self.ratios, "> 0 and finite")
+        by_itself = isinstance(self.base, AutoExposure) and self.base.method in ("full", "mean", "percentile")
+        if not self.ratios and not by_itself:
+            raise _refuse("channel_ratios", "auto", "numbers, unless auto.method is full, mean or percentile")
 
 
 Exposure: TypeAlias = FixedExposure | AutoExposure | BracketExposure | BurstExposure | ChannelExposure

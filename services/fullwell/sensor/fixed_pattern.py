@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -57,6 +57,10 @@ class FixedPattern:
 
     keys: tuple[tuple[int, int], ...]
     window: ArrayWindow
+
+    def of_rows(self, first: int, count: int) -> FixedPattern:
+        """Return the pattern of `count` of the window's rows from `first` on."""
+        return FixedPattern(self.keys, replace(self.window, top=self.window.top + first, rows=count))
 
     def key(self, effect: str) -> tuple[int, int]:
         """Return the key of one effect."""

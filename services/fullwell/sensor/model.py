@@ -39,6 +39,7 @@ __all__ = [
     "dark_noise_e",
     "digitise",
     "electrons_per_dn",
+    "expose_and_digitise",
     "photo_electron_rate",
     "read_out",
     "white_level_dn",
@@ -103,8 +104,14 @@ def read_out(
     (pattern,) = fixed_patterns(sensor, fixed_pattern_rng, 1)
     shot_rng, *readout_rngs = split_generator(rng, 1 + READOUT_STREAMS)
     check_exposure_time(exposure_time_s)
-    electrons = collect_electrons(electron_rate, sensor, exposure_time_s, pattern=pattern, rng=shot_rng)
-    digitised = digitise(electrons, sensor, pattern=pattern, rngs=tuple(readout_rngs))
+    (digitised,) = expose_and_digitise(
+        electron_rate,
+        sensor,
+        exposure_time_s,
+        pattern=pattern,
+        shot_rng=shot_rng,
+        readouts=((sensor, tuple(readout_rngs)),),
+    )
     mean_electrons = None
     if keep_mean_electrons:
         dark_e = dark_electrons(dark_current_e_per_s=dark_current_map(sensor, pattern), exposure_time_s=exposure_time_s)
@@ -124,6 +131,38 @@ def read_out(
         line_time_s=sensor.line_time_s,
         electrons_per_dn=electrons_per_dn(sensor),
     )
+
+
+def expose_and_digitise(
+    electron_rate: NDArray[np.float64],
+    sensor: SensorModel,
+    exposure_time_s: float | NDArray[np.float64],
+    *,
+    pattern: FixedPattern,
+    shot_rng: np.random.Generator,
+    readouts: tuple[tuple[SensorModel, tuple[np.random.Generator, ...]], ...],
+) -> tuple[Digitised, ...]:
+    """Collect electrons once and read them out by each of `readouts`: a model and its READOUT_STREAMS streams.
+
+    Row by row in blocks that stay in the processor's cache; the streams run on from block to block, so the size of the blocks
+    changes no number.
+    """
+    rows, cols = electron_rate.shape
+    results = tuple(Digitised(np.empty((rows, cols), np.uint16), np.empty((rows, cols), np.bool_)) for _ in readouts)
+    block = max(1, _PIXELS_AT_A_TIME // cols)
+    for first in range(0, rows, block):
+        part = slice(first, min(first + block, rows))
+        of_rows = pattern.of_rows(first, part.stop - first)
+        time_s = exposure_time_s[part] if isinstance(exposure_time_s, np.ndarray) else exposure_time_s
+        electrons = collect_electrons(electron_rate[part], sensor, time_s, pattern=of_rows, rng=shot_rng)
+        for (model, rngs), result in zip(readouts, results, strict=True):
+            digitised = digitise(electrons, model, pattern=of_rows, rngs=rngs)
+            result.dn[part] = digitised.dn
+            result.saturated[part] = digitised.saturated
+    return results
+
+
+_PIXELS_AT_A_TIME = 1 << 16
 
 
 def collect_electrons(

@@ -11,6 +11,7 @@ import pytest
 from fullwell.schema import RecipeError, apply_override, build_frame, load_recipe, validate
 from fullwell.sensor import (
     ArrheniusLaw,
+    AutoExposure,
     BracketExposure,
     BurstExposure,
     ChannelExposure,
@@ -107,6 +108,7 @@ def test_exposures_of_several_captures_reach_the_sensor(recipe: dict[str, Any]) 
     assert burst.base.area == (0, 0, 0.5, 0.5)  # type: ignore[union-attr]
     ratios = rig(recipe, model="imx363", exposure={"time_s": 0.01, "channel_ratios": {"R": 2}}).exposure
     assert isinstance(ratios, ChannelExposure)
+    assert rig(recipe, exposure={"auto": {}, "channel_ratios": "auto"}).exposure == ChannelExposure(AutoExposure())
 
 
 READOUT = {"name": "a", "conversion_gain_v_per_e": 1e-5, "read_noise_e": 1}
@@ -148,6 +150,8 @@ CASES: list[tuple[dict[str, Any], str, str]] = [
     ({"exposure": {"time_s": 1, "bracket": {"ratios": [1]}}}, "exposure.bracket.ratios", "at least 2"),
     ({"exposure": {"time_s": 1, "bracket": {"ratios": [1, 0]}}}, "exposure.bracket.ratios[1]", "> 0"),
     ({"exposure": {"time_s": 1, "bracket": {"ratios": [1, 2]}, "burst": {"count": 2}}}, "exposure.burst", "at most one"),
+    ({"exposure": {"time_s": 1, "channel_ratios": "auto"}}, "exposure.channel_ratios", "full, mean or percentile"),
+    ({"exposure": {"time_s": 1, "channel_ratios": "red"}}, "exposure.channel_ratios", "number by channel name"),
     ({"exposure": {"time_s": 1, "channel_ratios": {"Z": 2}}}, "exposure.channel_ratios.Z", "it has R, G, B"),
     ({"model": "imx490", "exposure": {"time_s": 1, "channel_ratios": {"R": 2}}}, "exposure.channel_ratios", "several"),
     ({"exposure": {"auto": {"method": "area", "area": [0.5, 0, 0.6, 1]}}}, "exposure.auto.area", "every edge"),

@@ -27,6 +27,7 @@ from fullwell.sensor import (
     saturation_electrons,
     sensor,
 )
+from fullwell.sensor.cfa import channel_index_map
 from fullwell.sensor.exposure import metered_rate
 
 ROUNDING = 1e-12
@@ -188,6 +189,26 @@ def test_channels_of_different_times_agree_on_the_light() -> None:
     np.testing.assert_allclose(apart.mean_electrons, plain.mean_electrons, rtol=1e-6)
     noise_dn = 6 * np.sqrt(4 * np.maximum(plain.mean_electrons, 1.0)) / plain.electrons_per_dn + 3  # type: ignore[arg-type, type-var]
     assert np.all(np.abs(apart.dn.astype(float) - plain.dn.astype(float)) < noise_dn)
+
+
+def test_channels_find_their_own_times() -> None:
+    camera = rgb()
+    raw = shoot(camera, ChannelExposure(AutoExposure("full", level=0.5, max_time_s=100.0)))
+    times_s = dict(raw.channel_exposure_time_s)
+    rate = expected_electrons(scene(), camera, 1.0)
+    index = channel_index_map(camera.cfa, rows=10, cols=10)
+    for k, name in enumerate(camera.cfa.channel_names):
+        assert np.max(rate[index == k]) * times_s[name] == pytest.approx(50_000, rel=ROUNDING)
+    assert raw.exposure_time_s == max(times_s.values())
+
+
+def test_the_size_of_the_blocks_changes_no_number(monkeypatch: pytest.MonkeyPatch) -> None:
+    camera = replace(sensor("imx490"), rows=10, cols=10, dsnu_v=1e-3, prnu_fraction=0.01, row_noise_v=1e-3, row_offset_v=1e-3)
+    camera = replace(camera, hot_pixel_fraction=0.1, hot_pixel_dark_current_e_per_s=1e4, column_offset_v=1e-3, reset_noise_e=3)
+    whole = shoot(camera, FixedExposure(0.01)).dn
+    for pixels in (1, 20, 70):
+        monkeypatch.setattr("fullwell.sensor.model._PIXELS_AT_A_TIME", pixels)
+        np.testing.assert_array_equal(shoot(camera, FixedExposure(0.01)).dn, whole)
 
 
 def test_the_rows_of_a_rolling_shutter_start_one_after_the_other() -> None:

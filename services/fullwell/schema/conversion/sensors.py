@@ -100,6 +100,9 @@ def exposure_of(document: ExposureDocument, model: SensorModel, path: str) -> Ex
             f"need a sensor with one readout; {model.name} has several. Give a bracket, or take another model.",
             model.name,
         )
+    if document.channel_ratios == "auto":
+        with located(f"{path}.channel_ratios"):
+            return ChannelExposure(base)
     names = model.cfa.channel_names
     for name in document.channel_ratios:
         if name not in names:

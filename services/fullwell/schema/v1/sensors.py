@@ -71,6 +71,20 @@ class BurstDocument(Document):
     combination: Literal["mean", "sum"] = "mean"
 
 
+def _auto_or_ratios(value: Any) -> str | None:
+    return "auto" if value == "auto" else "ratios" if isinstance(value, dict) else None
+
+
+_ChannelRatios = Annotated[
+    Annotated[Literal["auto"], Tag("auto")] | Annotated[dict[Name, _Ratio], Field(min_length=1), Tag("ratios")],
+    Discriminator(
+        _auto_or_ratios,
+        custom_error_type="wrong_form",
+        custom_error_message="must be a number by channel name, or auto: each channel by itself",
+    ),
+]
+
+
 class ExposureDocument(Document):
     """A fixed `time_s`, or `auto`; and at most one of `bracket`, `burst` and `channel_ratios`."""
 
@@ -78,7 +92,7 @@ class ExposureDocument(Document):
     auto: AutoExposureDocument | None = None
     bracket: BracketDocument | None = None
     burst: BurstDocument | None = None
-    channel_ratios: dict[Name, _Ratio] | None = Field(default=None, min_length=1)
+    channel_ratios: _ChannelRatios | None = None
 
     @model_validator(mode="after")
     def _one(self) -> ExposureDocument:
