@@ -140,7 +140,8 @@ def expose(
     Raises
     ------
     FieldError
-        As `photo_electron_rate`; channel ratios for a channel that the sensor has not, or on a sensor with several readouts.
+        As `photo_electron_rate`; channel ratios for a channel that the sensor has not, or on a sensor with several readouts;
+        captures to combine that dark current alone fills.
     """
     currents = channel_currents(light, sensor.cfa) if isinstance(light, OpticalImage) else light
     rate = photo_electron_rate(currents, sensor)
@@ -311,6 +312,7 @@ def _combined(job: _Job, times_s: tuple[float, ...], reference_s: float, combina
                 captures.append(capture_)
                 records.append(record)
         start_s += time_s + readout_duration_s(rows=sensor.rows, line_time_s=sensor.line_time_s)
+    _check_room_for_light(captures, records)
     combined = combine_captures(tuple(captures), combination)
     return RawImage(
         dn=combined.dn,
@@ -330,6 +332,19 @@ def _combined(job: _Job, times_s: tuple[float, ...], reference_s: float, combina
             replace(record, used_fraction=used) for record, used in zip(records, combined.used_fractions, strict=True)
         ),
     )
+
+
+def _check_room_for_light(captures: list[Capture], records: list[CaptureRecord]) -> None:
+    """Refuse captures that dark current alone fills: nothing can be taken off them that leaves light."""
+    for capture_, record in zip(captures, records, strict=True):
+        if not capture_.largest_signal > 0:
+            raise FieldError(
+                f"dark current makes {capture_.dark_e:g} e- in {record.exposure_time_s:g} s, more than photodiode "
+                f"{record.photodiode!r} with readout {record.readout!r} can hold, so that it sees no light. Lower "
+                "dark_current_e_per_s, temperature_k or the exposure time.",
+                path="dark_current_e_per_s",
+                value=capture_.dark_e,
+            )
 
 
 def _only_photodiode(sensor: SensorModel) -> Photodiode:

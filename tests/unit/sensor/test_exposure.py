@@ -250,6 +250,13 @@ def test_every_plan_of_captures_gives_a_linear_image_within_its_levels(name: str
     assert np.mean(signal_e[unsaturated]) == pytest.approx(float(np.mean(raw.mean_electrons[unsaturated])), rel=0.02)
 
 
+def test_dark_current_that_fills_a_capture_to_combine_is_refused() -> None:
+    hot = replace(sensor("imx490"), rows=10, cols=10, pixel_pitch_m=4e-6, dark_current_e_per_s=50.0, temperature_k=420.0)
+    with pytest.raises(FieldError, match="sees no light"):
+        shoot(hot, FixedExposure(1.0))
+    assert shoot(replace(hot, photodiodes=()), FixedExposure(1.0)).saturated_fraction == 1.0
+
+
 def test_a_burst_has_the_fixed_pattern_of_a_single_frame() -> None:
     camera = mono(dsnu_v=0.01, analog_offset_v=0.1)
     black = OpticalImage(np.zeros((10, 10, 11), np.float32), GRID, 4e-6)
