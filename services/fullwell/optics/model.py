@@ -9,20 +9,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fullwell.core.errors import FieldError, unknown_name_message
+from fullwell.optics.blur import (
+    MAX_SKIPPED_CONTRAST_LOSS,
+    Blur,
+    DiffractionBlur,
+    NoBlur,
+    PointImageBlur,
+    flare_images,
+    wavefront_images,
+)
 from fullwell.optics.camera_equation import on_axis_factor_sr, working_f_number
-from fullwell.optics.diffraction import DiffractionFilter, airy_radius_m, nyquist_contrast_loss
+from fullwell.optics.defocus import defocus
+from fullwell.optics.parameters import OpticsOptions
 from fullwell.optics.relative_illumination import relative_illumination
 from fullwell.radiometry.images import RadianceImage
 from fullwell.scene.camera import Lens
 from fullwell.scene.images import OpticalImage
 
-__all__ = ["MAX_SKIPPED_CONTRAST_LOSS", "OPTICS_TERMS", "OpticsTerm", "compute_irradiance"]
+__all__ = ["IDEAL_LENS", "MAX_SKIPPED_CONTRAST_LOSS", "OPTICS_TERMS", "OpticsTerm", "compute_irradiance"]
 
-OpticsTerm: TypeAlias = Literal["relative_illumination", "diffraction"]
+OpticsTerm: TypeAlias = Literal["defocus", "relative_illumination", "psf", "flare", "aberrations", "diffraction"]
 OPTICS_TERMS: Final[tuple[OpticsTerm, ...]] = get_args(OpticsTerm)
 
-MAX_SKIPPED_CONTRAST_LOSS: Final = 0.005
-"""Diffraction is left out where it would take less than this from the contrast at the image's Nyquist frequency."""
+IDEAL_LENS: Final = OpticsOptions()
+"""Diffraction and falloff only."""
 
 _BRIGHTEST = 1e38
 """Photons s^-1 m^-2 sr^-1 nm^-1; times the solid angle of the fastest lens this still fits single precision."""
@@ -32,30 +42,41 @@ _BANDS_AT_A_TIME = 8
 
 
 def compute_irradiance(
-    radiance: RadianceImage, lens: Lens, *, terms: Collection[OpticsTerm] = OPTICS_TERMS, workers: int = 1
+    radiance: RadianceImage,
+    lens: Lens,
+    options: OpticsOptions = IDEAL_LENS,
+    *,
+    terms: Collection[OpticsTerm] = OPTICS_TERMS,
+    workers: int = 1,
 ) -> OpticalImage:
-    """Form the optical image: camera equation, then relative illumination, then diffraction.
+    """Form the optical image: defocus, camera equation, relative illumination, then the blur of the lens.
+
+    The blur is that of `options.psf`, of the aperture's flare, of the wavefront's aberrations (with flare where both are
+    given), or diffraction alone.
 
     Parameters
     ----------
     radiance
         Photon radiance, finite and >= 0. It is not modified.
+    options
+        Effects beyond an ideal lens.
     lens
         Its `diffraction` switch and its f-number hold for the pinhole too.
     terms
-        Effects to include; the camera equation is always included.
+        Effects to include; the camera equation is always included, and what `options` does not ask for is not.
     workers
         Threads of the transforms; the result does not depend on it.
 
     Returns
     -------
-    The image on the sensor plane, on the same samples; `notes` says what was left out and why. No distortion, aberration,
-    flare or vignetting by barrels; defocus is the renderer's.
+    The image on the sensor plane, on the same samples; `notes` says what was done and left out, why, and with what bound. No
+    distortion, no vignetting by barrels, no change of the blur over the field.
 
     Raises
     ------
     FieldError
-        NaN, Inf or negative radiance; unknown term; a lens that forms no image.
+        NaN, Inf or negative radiance; unknown term; a lens that forms no image; depths for a picture that has its depth of
+        field already.
     """
     _check_radiance(radiance)
     for term in terms:
@@ -64,17 +85,27 @@ def compute_irradiance(
     sample_pitch_m = radiance.tangent_pitch * lens.image_distance_m
     on_axis = on_axis_factor_sr(lens, radiance.grid)
     falloff, notes = np.ones((radiance.rows, 1)), []
+    if options.depth_z_m is not None and "defocus" in terms:
+        _check_pinhole(lens)
+        radiance, note = defocus(radiance, options.depth_z_m, lens, workers=workers)
+        notes.append(note)
     if "relative_illumination" in terms:
         falloff = relative_illumination(rows=radiance.rows, cols=radiance.cols, tangent_pitch=radiance.tangent_pitch, lens=lens)
     else:
         notes.append("relative_illumination: left out on request.")
-    blurred_bands, why = _bands_to_diffract(radiance, lens, terms=terms, pitch_m=sample_pitch_m)
-    if why:
-        notes.append(why)
-    photons = _form_image(
-        radiance, lens, on_axis=on_axis, falloff=falloff, blurred_bands=blurred_bands, pitch_m=sample_pitch_m, workers=workers
-    )
-    return OpticalImage(photons=photons, grid=radiance.grid, sample_pitch_m=sample_pitch_m, notes=tuple(notes))
+    blur = _choose_blur(radiance, lens, options, terms=terms, pitch_m=sample_pitch_m, workers=workers)
+    photons = _form_image(radiance, on_axis=on_axis, falloff=falloff, blur=blur)
+    return OpticalImage(photons=photons, grid=radiance.grid, sample_pitch_m=sample_pitch_m, notes=(*notes, *blur.notes()))
+
+
+def _check_pinhole(lens: Lens) -> None:
+    if lens.kind != "pinhole":
+        raise FieldError(
+            f"lens.kind is {lens.kind!r}, whose depth of field is in the radiance already; defocus by depth layers needs a "
+            "picture rendered through a 'pinhole'. Set lens.kind.",
+            path="kind",
+            value=lens.kind,
+        )
 
 
 def _check_radiance(radiance: RadianceImage) -> None:
@@ -95,43 +126,51 @@ def _check_radiance(radiance: RadianceImage) -> None:
         )
 
 
-def _bands_to_diffract(
-    radiance: RadianceImage, lens: Lens, *, terms: Collection[OpticsTerm], pitch_m: float
-) -> tuple[frozenset[int], str]:
-    """Return the indices of the bands that diffraction changes visibly, and the note on the others."""
-    if "diffraction" not in terms:
-        return frozenset(), "diffraction: left out on request."
-    if not lens.diffraction:
-        return frozenset(), "diffraction: switched off in the lens."
+def _choose_blur(
+    radiance: RadianceImage, lens: Lens, options: OpticsOptions, *, terms: Collection[OpticsTerm], pitch_m: float, workers: int
+) -> Blur:
+    """Return the filter of the bands: the most complete of the point images asked for, else diffraction."""
     f_number = working_f_number(lens.f_number, lens.magnification)
-    wavelengths = [float(w) for w in radiance.grid.centres_nm]
-    losses = [nyquist_contrast_loss(wavelength_nm=w, f_number=f_number, pitch_m=pitch_m) for w in wavelengths]
-    kept = frozenset(k for k, loss in enumerate(losses) if loss > MAX_SKIPPED_CONTRAST_LOSS)
-    skipped = [k for k in range(len(losses)) if k not in kept]
-    if not skipped:
-        return kept, ""
-    radius_m = max(airy_radius_m(wavelengths[k], f_number) for k in skipped)
-    worst = max(losses[k] for k in skipped)
-    return kept, (
-        f"diffraction: left out in {len(skipped)} of {len(losses)} bands; the Airy radius is at most {radius_m:.3g} m against "
-        f"a sample pitch of {pitch_m:.3g} m; contrast at Nyquist is too high by at most {worst:.2g}."
-    )
+    wavelengths = radiance.grid.centres_nm
+    wavefront = options.wavefront if "aberrations" in terms else None
+    if options.psf is not None and "psf" in terms:
+        return PointImageBlur("psf", options.psf.at, pitch_m=pitch_m, workers=workers)
+    if options.aperture is not None and "flare" in terms:
+        images, remark = flare_images(
+            options.aperture,
+            wavefront,
+            f_number=f_number,
+            pupil_diameter_m=lens.pupil_diameter_m,
+            pitch_m=pitch_m,
+            reach_m=max(radiance.rows, radiance.cols) * pitch_m,
+            shortest_nm=float(wavelengths[0]),
+        )
+        return PointImageBlur("flare", images, pitch_m=pitch_m, workers=workers, remark=remark)
+    if wavefront is not None:
+        images, remark = wavefront_images(
+            wavefront,
+            f_number=f_number,
+            pupil_diameter_m=lens.pupil_diameter_m,
+            pitch_m=pitch_m,
+            wavelength_nm=float(wavelengths[len(wavelengths) // 2]),
+        )
+        return PointImageBlur("aberrations", images, pitch_m=pitch_m, workers=workers, remark=remark)
+    if "diffraction" not in terms:
+        return NoBlur("diffraction: left out on request.")
+    if not lens.diffraction:
+        return NoBlur("diffraction: switched off in the lens.")
+    return DiffractionBlur(radiance.rows, radiance.cols, f_number=f_number, pitch_m=pitch_m, workers=workers)
 
 
 def _form_image(
     radiance: RadianceImage,
-    lens: Lens,
     *,
     on_axis: NDArray[np.float64],
     falloff: NDArray[np.float64],
-    blurred_bands: frozenset[int],
-    pitch_m: float,
-    workers: int,
+    blur: Blur,
 ) -> NDArray[np.float32]:
     photons = np.empty(radiance.photons.shape, dtype=np.float32)
     wavelengths = radiance.grid.centres_nm
-    f_number = working_f_number(lens.f_number, lens.magnification)
-    blur = DiffractionFilter(radiance.rows, radiance.cols, pitch_m=pitch_m, workers=workers)
     # Transforms run in double precision: a headlight is 1e7 times brighter than the road beside it, and the rounding
     # of a single-precision transform is a fraction of the brightest sample everywhere.
     buffer = np.empty((min(_BANDS_AT_A_TIME, radiance.grid.count), radiance.rows, radiance.cols))
@@ -143,8 +182,9 @@ def _form_image(
             np.multiply(radiance.photons[row, :, bands.start : bands.stop].T, falloff[row], out=block[:, row])
             block[:, row] *= on_axis[bands.start : bands.stop, None]
         for k, band in zip(bands, block, strict=True):
-            if k in blurred_bands:
-                band[:] = blur.apply(band, wavelength_nm=float(wavelengths[k]), f_number=f_number)
+            blurred = blur.apply(band, float(wavelengths[k]))
+            if blurred is not band:
+                band[:] = blurred
         for row in range(radiance.rows):
             photons[row, :, bands.start : bands.stop] = block[:, row].T
     return photons

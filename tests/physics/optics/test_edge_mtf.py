@@ -19,8 +19,8 @@ ENERGY_TOLERANCE = 1e-6
 ROUNDING = 1e-12
 """Relative; double precision, and neighbouring sums of it."""
 
-TAIL_FACTOR = 1.8
-"""The bound of 1.2 about the smooth tail, which itself is 1.45 times its far form at the second sample."""
+TAIL_FACTOR = 1.9
+"""The bound of 1.3 about the smooth tail, which itself is 1.45 times its far form at the second sample."""
 
 WAVELENGTH_NM = 550.0
 OVERSAMPLING = 8
@@ -111,15 +111,15 @@ def test_a_lamp_in_the_dark_leaves_no_dots() -> None:
     image[28:32, 30:50] = 1.0
     blurred = diffract_band(image, wavelength_nm=WAVELENGTH_NM, f_number=2.0, pitch_m=2.8e-6)
     row, column = blurred[30, 52:64], blurred[34:46, 40]
-    assert np.all(row[1:] < 1.2**2 * row[:-1])
-    assert np.all(column[1:] < 1.2**2 * column[:-1])
+    assert np.all(row[1:] < 1.3**2 * row[:-1])
+    assert np.all(column[1:] < 1.3**2 * column[:-1])
 
 
 def test_the_bound_against_ringing_opens_continuously_to_none() -> None:
     def bound(fineness: float) -> float:
         return ringing_bound(wavelength_nm=500.0, f_number=2.0, pitch_m=1e-6 / fineness)
 
-    assert bound(0.01) == bound(1.25) == 1.2
+    assert bound(0.01) == bound(1.25) == 1.3
     assert math.isinf(bound(2.0))
     assert math.isinf(bound(6.0))
     fineness = np.linspace(1.2, 1.99, 200)
