@@ -13,6 +13,9 @@ import pytest
 
 from fullwell.schema import RecipeError, apply_override, load_recipe, validate
 
+HANGING_S = 20.0
+"""A refusal that takes this long hangs. An idle machine needs a second at most; speed itself is a benchmark's business."""
+
 QUAD = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 TETRAHEDRON = {
     "kind": "mesh",
@@ -179,7 +182,7 @@ def test_nonsense_gives_one_clear_error_with_its_path(
     started = time.perf_counter()
     with pytest.raises(RecipeError) as caught:
         validate(load_recipe(recipe))
-    assert time.perf_counter() - started < 2.0
+    assert time.perf_counter() - started < HANGING_S
     assert caught.value.path == path
     assert words in caught.value.message
     assert path.split(".", maxsplit=1)[0] in caught.value.message
