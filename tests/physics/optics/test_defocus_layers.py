@@ -16,8 +16,9 @@ ROUNDING = 1e-6
 """Relative; the radiance is stored in single precision."""
 
 RENDERED_TOLERANCE = 0.05
-"""Of the brightest, root mean square: diameters known to half a sample, a guess of what near objects hide, and edges that all
-lie on the borders of samples, where a disc of diameter d spills 0.106 d into the next sample and a kernel of its variance less."""
+"""Of the brightest, root mean square: diameters known to half a sample, a guess of what near objects hide, and edges that
+all lie on the borders of samples, where a disc of diameter d spills 0.106 d into the next sample and a kernel of the same
+variance less."""
 
 RENDERED_LIGHT_TOLERANCE = 0.01
 """Of the sum over the picture: what enters at the border is a guess, and light hidden and unhidden need not balance."""
