@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 from typing import Final, Literal, TypeAlias, get_args
 
 import numpy as np
@@ -90,7 +91,11 @@ def compute_irradiance(
         radiance, note = defocus(radiance, options.depth_z_m, lens, workers=workers)
         notes.append(note)
     if "relative_illumination" in terms:
-        falloff = relative_illumination(rows=radiance.rows, cols=radiance.cols, tangent_pitch=radiance.tangent_pitch, lens=lens)
+        # A picture whose depth of field comes from layers is that of a thin lens, though it was rendered through a pinhole.
+        pupil = lens if options.depth_z_m is None else replace(lens, kind="thin_lens")
+        falloff = relative_illumination(
+            rows=radiance.rows, cols=radiance.cols, tangent_pitch=radiance.tangent_pitch, lens=pupil
+        )
     else:
         notes.append("relative_illumination: left out on request.")
     blur = _choose_blur(radiance, lens, options, terms=terms, pitch_m=sample_pitch_m, workers=workers)

@@ -7,7 +7,7 @@ import importlib.metadata
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from fullwell.dataset import encode
 from fullwell.dataset.dng import check_dng_pattern, encode_raw_dng
 from fullwell.isp import DisplayImage, develop, scene_illuminant
 from fullwell.labels import Labels, labels_document, make_labels
-from fullwell.optics import compute_irradiance
+from fullwell.optics import OpticsOptions, compute_irradiance
 from fullwell.pipeline.cache import RadianceCache
 from fullwell.pipeline.keys import frame_digest, radiance_key
 from fullwell.pipeline.plan import FramePlan, plan_document, plan_frame
@@ -172,7 +172,7 @@ def _camera_products(run: _Run, rig: CameraRig, position: int) -> None:
         if plan.optics:
             run.report("optics", base + share * _RENDER_SHARE)
             with run.stage(f"{name}: optics"):
-                optical = compute_irradiance(radiance, rig.camera.lens)
+                optical = compute_irradiance(radiance, rig.camera.lens, _optics_options(run, rig))
             run.notes.extend(f"{name}: {note}" for note in optical.notes)
             _add(run, f"{folder}irradiance.exr", lambda: encode.encode_irradiance_exr(optical))
             images = (radiance, optical)
@@ -182,6 +182,14 @@ def _camera_products(run: _Run, rig: CameraRig, position: int) -> None:
         inner = f"{folder}{sensor.name}/" if len(rig.sensors) > 1 else folder
         document["sensors"].append(_sensor_products(run, rig, sensor, inner, images))
     run.cameras.append(document)
+
+
+def _optics_options(run: _Run, rig: CameraRig) -> OpticsOptions:
+    """Return the options of the lens, with the depth of every film sample where depth of field is made from layers."""
+    if not rig.depth_layers:
+        return rig.optics
+    hits = query_surfaces(run.frame.scene, rig.camera, should_cancel=run.should_cancel)
+    return replace(rig.optics, depth_z_m=make_labels(run.frame.scene, rig.camera, hits).depth_z_m)
 
 
 def _add(run: _Run, name: str, encoder: Any) -> None:

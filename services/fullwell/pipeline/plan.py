@@ -74,12 +74,33 @@ def _camera_steps(frame: FrameDescription, rig: CameraRig, radiance: bool, optic
         glass = any(isinstance(part.material, Dielectric) for item in frame.scene.objects for part in item.parts)
         why = "glass in the scene" if glass else "no glass in the scene"
         steps.append(PlanStep(f"{camera.name}: paths", "run", f"up to {depth} segments ({why})", "paths that are longer"))
-        if camera.lens.kind == "pinhole":
+        if rig.depth_layers:
+            what = f"{camera.name}: depth of field"
+            steps.append(PlanStep(what, "run", f"layers by depth at f/{camera.lens.f_number:g}", "half a pixel of blur"))
+        elif camera.lens.kind == "pinhole":
             steps.append(PlanStep(f"{camera.name}: depth of field", "skip", "the lens is a pinhole"))
         else:
             steps.append(PlanStep(f"{camera.name}: depth of field", "run", f"thin lens at f/{camera.lens.f_number:g}"))
+    if optics:
+        steps.extend(_blur_steps(rig))
     if optics and not camera.lens.diffraction:
         steps.append(PlanStep(f"{camera.name}: diffraction", "skip", "the recipe turns it off", "not bounded: asked for"))
+    return steps
+
+
+def _blur_steps(rig: CameraRig) -> list[PlanStep]:
+    """Say which effects of a real lens take part."""
+    asked = {
+        "aberrations": ("a wavefront", rig.optics.wavefront),
+        "flare": ("an aperture", rig.optics.aperture),
+        "point image": ("a psf", rig.optics.psf),
+    }
+    steps = []
+    for what, (field_name, value) in asked.items():
+        if value is None:
+            steps.append(PlanStep(f"{rig.camera.name}: {what}", "skip", f"the lens has no {field_name.split()[1]}"))
+        else:
+            steps.append(PlanStep(f"{rig.camera.name}: {what}", "run", f"the lens has {field_name}"))
     return steps
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fullwell.isp.parameters import IspSettings
+from fullwell.optics import IDEAL_LENS, OpticsOptions
 from fullwell.radiometry import WavelengthGrid
 from fullwell.scene import Camera, SceneDescription
 from fullwell.sensor.parameters import Exposure, SensorModel
@@ -51,6 +52,9 @@ class CameraRig:
 
     camera: Camera
     sensors: tuple[SensorRig, ...]
+    optics: OpticsOptions = IDEAL_LENS
+    depth_layers: bool = False
+    """Whether depth of field is made from a sharp picture and its depths; the camera's lens is then a pinhole with a focus."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -121,7 +121,8 @@ def test_the_optics_stage_defocuses_first() -> None:
     values = np.random.default_rng(3).random((48, 64)) * 1e16
     depth = np.full((48, 64), 1.0)
     focused = lens(4.0)
-    expected = compute_irradiance(defocus(picture(values), depth, focused)[0], focused)
+    # Behind the layers stands the pupil of a thin lens, with its falloff.
+    expected = compute_irradiance(defocus(picture(values), depth, focused)[0], lens(4.0, "thin_lens"))
     found = compute_irradiance(picture(values), focused, OpticsOptions(depth_z_m=depth))
     np.testing.assert_array_equal(found.photons, expected.photons)
     assert found.notes[0].startswith("defocus: 1 depth layers")

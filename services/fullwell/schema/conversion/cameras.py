@@ -16,6 +16,7 @@ from fullwell.radiometry import Spectrum
 from fullwell.scene import Camera, Film, Lens
 from fullwell.scene.camera import look_at
 from fullwell.schema.conversion.context import Context, fail, located
+from fullwell.schema.conversion.optics import optics_options
 from fullwell.schema.conversion.sensors import exposure_of, sensor_model
 from fullwell.schema.conversion.spectra import reflectance_of, spd_of
 from fullwell.schema.errors import RecipeError
@@ -54,7 +55,11 @@ def camera_rig(document: CameraDocument, path: str, oversampling: int, context: 
         )
         for i, (sensor, model) in enumerate(zip(document.sensors, models, strict=True))
     ]
-    return CameraRig(Camera(document.name, pose, lens, film), tuple(sensors))
+    options = optics_options(document.lens, lens, f"{path}.lens", context)
+    layers = document.lens.depth_of_field == "layers"
+    if layers:
+        lens = dataclasses.replace(lens, kind="pinhole")
+    return CameraRig(Camera(document.name, pose, lens, film), tuple(sensors), options, depth_layers=layers)
 
 
 def _pose(document: PoseDocument, path: str) -> NDArray[np.float64]:

@@ -23,6 +23,7 @@ from fullwell.schema.v1.common import (
     exactly_one,
     refuse,
 )
+from fullwell.schema.v1.optics import ApertureDocument, PsfDocument, WavefrontDocument
 from fullwell.schema.v1.sensors import (
     AutoExposureDocument,
     CfaDocument,
@@ -72,7 +73,12 @@ class PoseDocument(Document):
 
 
 class LensDocument(Document):
-    """A pinhole or a thin lens. The field of view `hfov_deg` is that of the first sensor's width."""
+    """A pinhole or a thin lens. The field of view `hfov_deg` is that of the first sensor's width.
+
+    The depth of field of a thin lens is traced ray by ray (`rendered`), or made from a sharp picture and its depths (`layers`),
+    which lets many apertures and focus distances share one rendering. `psf` stands for the whole lens in place of `wavefront`
+    and `aperture`.
+    """
 
     kind: Literal["pinhole", "thin_lens"] = "pinhole"
     focal_length_m: Annotated[float, Range(gt=0, le=100)] | None = None
@@ -81,6 +87,10 @@ class LensDocument(Document):
     focus_distance_m: PositiveOrInf | None = None
     transmittance: Reflectance = 1.0
     diffraction: Flag = True
+    depth_of_field: Literal["rendered", "layers"] = "rendered"
+    wavefront: WavefrontDocument | None = None
+    aperture: ApertureDocument | None = None
+    psf: PsfDocument | None = None
 
     @model_validator(mode="after")
     def _one_length(self) -> LensDocument:
@@ -88,6 +98,12 @@ class LensDocument(Document):
         focal, focus = self.focal_length_m, self.focus_distance_m
         if focal is not None and focus is not None and not focus > focal:
             refuse(f"is {focus:g}; must be > the focal length, {focal:g} m.", "focus_distance_m", value=focus)
+        if self.depth_of_field == "layers" and self.kind != "thin_lens":
+            refuse("is 'layers', but a pinhole has no depth of field; set kind: thin_lens.", "depth_of_field", value="layers")
+        if self.psf is not None and (self.wavefront is not None or self.aperture is not None):
+            refuse("is the image of a point through the whole lens; remove it, or wavefront and aperture.", "psf")
+        if not self.diffraction and (self.wavefront is not None or self.aperture is not None):
+            refuse("is false, but aberrations and flare come with diffraction; leave it true.", "diffraction", value=False)
         return self
 
 
