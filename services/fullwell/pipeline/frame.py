@@ -17,10 +17,11 @@ from fullwell.core.hashing import sha256_hex
 from fullwell.core.rng import seed32, stream
 from fullwell.dataset import encode
 from fullwell.dataset.dng import check_dng_pattern, encode_raw_dng
-from fullwell.isp import DisplayImage, develop, scene_illuminant
+from fullwell.isp import scene_illuminant
 from fullwell.labels import Labels, labels_document, make_labels
-from fullwell.optics import OpticsOptions, compute_irradiance
+from fullwell.optics import OpticsOptions
 from fullwell.pipeline.cache import RadianceCache
+from fullwell.pipeline.camera_chain import develop_picture, form_image, take_picture
 from fullwell.pipeline.keys import frame_digest, radiance_key
 from fullwell.pipeline.plan import FramePlan, plan_document, plan_frame
 from fullwell.pipeline.progress import CancelCheck, FrameProgress, ProgressCallback
@@ -29,7 +30,7 @@ from fullwell.render import RenderStatistics, choose_variant, query_surfaces, re
 from fullwell.scene import Camera, Film
 from fullwell.scene.images import OpticalImage, RawImage
 from fullwell.schema.frame import CameraRig, FrameDescription, SensorRig
-from fullwell.sensor import SensorModel, dark_noise_e, expose, fixed_pattern_stream, reference_model
+from fullwell.sensor import SensorModel, dark_noise_e, reference_model
 from fullwell.storage import ObjectStore
 
 __all__ = ["MANIFEST_NAME", "MANIFEST_SCHEMA", "render_frame"]
@@ -163,7 +164,12 @@ def _camera_products(run: _Run, rig: CameraRig, position: int) -> None:
     frame, plan, name = run.frame, run.plan, rig.camera.name
     base, share = position / len(frame.cameras), 0.97 / len(frame.cameras)
     folder = f"{name}/" if len(frame.cameras) > 1 else ""
-    document: dict[str, Any] = {"name": name, "camera_to_world": rig.camera.camera_to_world.tolist(), "sensors": []}
+    document: dict[str, Any] = {
+        "name": name,
+        "model": rig.model,
+        "camera_to_world": rig.camera.camera_to_world.tolist(),
+        "sensors": [],
+    }
     images: tuple[RadianceImage, OpticalImage] | None = None
     if plan.radiance:
         radiance, statistics, key = _radiance(run, rig, base, share * _RENDER_SHARE)
@@ -172,7 +178,7 @@ def _camera_products(run: _Run, rig: CameraRig, position: int) -> None:
         if plan.optics:
             run.report("optics", base + share * _RENDER_SHARE)
             with run.stage(f"{name}: optics"):
-                optical = compute_irradiance(radiance, rig.camera.lens, _optics_options(run, rig))
+                optical = form_image(rig, radiance, _optics_options(run, rig))
             run.notes.extend(f"{name}: {note}" for note in optical.notes)
             _add(run, f"{folder}irradiance.exr", lambda: encode.encode_irradiance_exr(optical))
             images = (radiance, optical)
@@ -260,9 +266,8 @@ def _sensor_products(
         _add(run, f"{folder}raw.dng", lambda: encode_raw_dng(raw, sensor.isp, scene_light=light))
         if run.plan.display:
             with run.stage(f"{rig.camera.name}/{sensor.name}: isp"):
-                display = develop(raw, sensor.isp, scene_light=light)
-            document["isp"] = _isp_document(display)
-            _add(run, f"{folder}image.png", lambda: encode.encode_rgb_png(display.rgb))
+                rgb, document["isp"] = develop_picture(rig, sensor, raw, scene_light=light)
+            _add(run, f"{folder}image.png", lambda: encode.encode_rgb_png(rgb))
     if run.plan.labels:
         with run.stage(f"{rig.camera.name}/{sensor.name}: labels"):
             hits = query_surfaces(run.frame.scene, view, should_cancel=run.should_cancel)
@@ -279,14 +284,8 @@ def _sensor_view(camera: Camera, model: SensorModel) -> Camera:
 
 def _expose(run: _Run, rig: CameraRig, sensor: SensorRig, optical: OpticalImage) -> RawImage:
     with run.stage(f"{rig.camera.name}/{sensor.name}: sensor"):
-        return expose(
-            optical,
-            sensor.model,
-            sensor.exposure,
-            rng=stream(run.frame.seed, "sensor", run.frame.index, rig.camera.name, sensor.name),
-            fixed_pattern_rng=fixed_pattern_stream(sensor.model),
-            keep_mean_electrons=True,
-        )
+        rng = stream(run.frame.seed, "sensor", run.frame.index, rig.camera.name, sensor.name)
+        return take_picture(rig, sensor, optical, rng=rng)
 
 
 def _raw_document(raw: RawImage, model: SensorModel, radiance: RadianceImage) -> dict[str, Any]:
@@ -326,19 +325,6 @@ def _shutter_document(raw: RawImage) -> dict[str, Any]:
         "last_row_start_s": float(raw.row_start_s[-1]),
         "first_row_middle_s": float(raw.row_middle_s[0]),
         "last_row_middle_s": float(raw.row_middle_s[-1]),
-    }
-
-
-def _isp_document(display: DisplayImage) -> dict[str, Any]:
-    """Return what made colours of the channels, and how much noise that costs in the dark."""
-    calibration, matrix = display.calibration, display.colour_matrix
-    return {
-        "illuminant": calibration.illuminant.source,
-        "illuminant_xy": calibration.illuminant_xy,
-        "channels": list(calibration.channel_names),
-        "channel_gain_ratio": display.channel_gain_ratio.tolist(),
-        "colour_matrix": None if matrix is None else matrix.tolist(),
-        "noise_amplification": calibration.noise_amplification,
     }
 
 

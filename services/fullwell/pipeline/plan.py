@@ -81,7 +81,11 @@ def _camera_steps(frame: FrameDescription, rig: CameraRig, radiance: bool, optic
             steps.append(PlanStep(f"{camera.name}: depth of field", "skip", "the lens is a pinhole"))
         else:
             steps.append(PlanStep(f"{camera.name}: depth of field", "run", f"thin lens at f/{camera.lens.f_number:g}"))
-    if optics:
+    if rig.model == "isetcam":
+        steps.append(
+            PlanStep(f"{camera.name}: camera model", "run", "isetcam, as the recipe asks", "docs/validation/isetcam.md")
+        )
+    elif optics:
         steps.extend(_blur_steps(rig))
     if optics and not camera.lens.diffraction:
         steps.append(PlanStep(f"{camera.name}: diffraction", "skip", "the recipe turns it off", "not bounded: asked for"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from fullwell.isp.parameters import IspSettings
 from fullwell.optics import IDEAL_LENS, OpticsOptions
@@ -53,6 +54,8 @@ class CameraRig:
     camera: Camera
     sensors: tuple[SensorRig, ...]
     optics: OpticsOptions = IDEAL_LENS
+    model: Literal["physical", "isetcam"] = "physical"
+    """Whose camera it is: the physically right one, or ISETCam's with its quirks, to compare numbers with it."""
     depth_layers: bool = False
     """Whether depth of field is made from a sharp picture and its depths; the camera's lens is then a pinhole with a focus."""
 

@@ -107,3 +107,36 @@ def test_nonsense_of_the_lens_is_refused_by_name(
     recipe["cameras"][0]["lens"] |= lens
     with pytest.raises(RecipeError, match=expected):
         build_frame(load_recipe(recipe), base_dir=tmp_path)
+
+
+def test_the_cameras_model_can_be_isetcams(recipe: dict[str, Any], tmp_path: Path) -> None:
+    recipe["cameras"][0] |= {"model": "isetcam"}
+    recipe["cameras"][0]["lens"] = {"kind": "pinhole", "hfov_deg": 30, "f_number": 2, "focus_distance_m": 5.8}
+    recipe["cameras"][0]["sensors"][0]["model"] = "imx363-isetcam"
+    store = LocalStore(tmp_path)
+    manifest = render_frame(build_frame(load_recipe(recipe)), store, "f")
+    assert manifest["cameras"][0]["model"] == "isetcam"
+    assert manifest["cameras"][0]["sensors"][0]["white_level_dn"] == 1024
+    optical = encode.decode_irradiance_exr(store.get("f/irradiance.exr"))
+    assert (optical.rows, optical.cols) == (20, 30)  # a dark border of an eighth on each side
+    raw = encode.decode_raw_npz(store.get("f/raw.npz"))
+    assert raw.dn.shape == (16, 24)
+    assert raw.dn.max() > raw.black_level_dn
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({}, r"cameras\[0\]\.lens\.kind is 'thin_lens'"),
+        ({"kind": "pinhole"}, r"focus_distance_m is missing"),
+        (
+            {"kind": "pinhole", "focus_distance_m": 5.0, "aperture": {"blades": 6}},
+            r"lens\.aperture is not part of model isetcam",
+        ),
+    ],
+)
+def test_what_isetcam_does_not_know_is_refused(recipe: dict[str, Any], changes: dict[str, Any], expected: str) -> None:
+    recipe["cameras"][0]["model"] = "isetcam"
+    recipe["cameras"][0]["lens"] |= changes
+    with pytest.raises(RecipeError, match=expected):
+        load_recipe(recipe)

@@ -59,7 +59,7 @@ def camera_rig(document: CameraDocument, path: str, oversampling: int, context: 
     layers = document.lens.depth_of_field == "layers"
     if layers:
         lens = dataclasses.replace(lens, kind="pinhole")
-    return CameraRig(Camera(document.name, pose, lens, film), tuple(sensors), options, depth_layers=layers)
+    return CameraRig(Camera(document.name, pose, lens, film), tuple(sensors), options, document.model, depth_layers=layers)
 
 
 def _pose(document: PoseDocument, path: str) -> NDArray[np.float64]:

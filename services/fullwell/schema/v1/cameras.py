@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -212,9 +213,32 @@ _MADE = frozenset(
 
 
 class CameraDocument(Document):
-    """A pose, one lens, and the sensors that see through it."""
+    """A pose, one lens, and the sensors that see through it.
+
+    `model: isetcam` computes optics, sensor and picture as ISETCam does, quirks included, for comparisons with it; the scene
+    then lies flat at `lens.focus_distance_m`.
+    """
 
     name: Name = "main"
+    model: Literal["physical", "isetcam"] = "physical"
     pose: PoseDocument
     lens: LensDocument
     sensors: list[SensorDocument] = Field(min_length=1, max_length=16)
+
+    @model_validator(mode="after")
+    def _known_to_isetcam(self) -> CameraDocument:
+        if self.model == "physical":
+            return self
+        for name in ("wavefront", "aperture", "psf"):
+            if getattr(self.lens, name) is not None:
+                refuse("is not part of model isetcam; remove it, or use model: physical.", "lens", name)
+        if self.lens.kind != "pinhole":
+            sentence = "is 'thin_lens', but model isetcam has the whole scene in focus; set kind: pinhole."
+            refuse(sentence, "lens", "kind", value=self.lens.kind)
+        if self.lens.focus_distance_m is None or math.isinf(self.lens.focus_distance_m):
+            refuse("is missing; model isetcam needs the distance of the scene [m].", "lens", "focus_distance_m")
+        for position, sensor in enumerate(self.sensors):
+            if sensor.isp.demosaic != "bilinear":
+                sentence = f"is {sensor.isp.demosaic!r}; model isetcam develops bilinear."
+                refuse(sentence, "sensors", position, "isp", "demosaic", value=sensor.isp.demosaic)
+        return self
