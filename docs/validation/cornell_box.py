@@ -227,7 +227,7 @@ def reference_blocks(like: RadianceImage) -> tuple[RadianceImage, RadianceImage]
 
 
 def lamp_form_factor(places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the share of a unit radiance's pi that the lamp sends to places (n, 3) on the back wall: Lambert's formula."""
+    """Return (n,) irradiance of places (n, 3) on the back wall over pi times the lamp's radiance (lambert1760)."""
     corners = np.array([[-0.25, -0.26, 0.99], [-0.25, 0.24, 0.99], [0.25, 0.24, 0.99], [0.25, -0.26, 0.99]])
     rays = corners - places[:, None]
     rays /= np.linalg.norm(rays, axis=2, keepdims=True)
