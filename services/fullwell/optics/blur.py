@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,8 +59,9 @@ class NoBlur:
 class DiffractionBlur:
     """Diffraction at a clear circular pupil, in the bands where it can be seen."""
 
-    def __init__(self, rows: int, cols: int, *, f_number: float, pitch_m: float, workers: int) -> None:
-        self._filter = DiffractionFilter(rows, cols, pitch_m=pitch_m, workers=workers)
+    def __init__(self, planes: NDArray[Any], *, f_number: float, pitch_m: float, workers: int) -> None:
+        """Prepare for the bands of the image whose texture is that of `planes`, (rows, cols, planes)."""
+        self._filter = DiffractionFilter(planes, pitch_m=pitch_m, workers=workers)
         self._f_number, self._pitch_m = f_number, pitch_m
         self._bands = 0
         self._skipped: list[tuple[float, float]] = []

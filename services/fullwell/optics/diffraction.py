@@ -10,7 +10,7 @@ import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
 from fullwell.core.constants import NM_PER_M
-from fullwell.optics.ringing import without_negative_light, without_ringing
+from fullwell.optics.ringing import texture, without_negative_light, without_ringing
 
 __all__ = [
     "DiffractionFilter",
@@ -19,22 +19,23 @@ __all__ = [
     "diffract_band",
     "diffraction_otf",
     "nyquist_contrast_loss",
-    "ringing_bound",
+    "ringing_slack",
 ]
 
 _FIRST_ZERO_OF_J1_OVER_PI = 1.2196698912665045
 
-_RINGING_FACTOR = 1.3
-"""Straight edges up to a contrast of 10 : 1 stay within it untouched, and the MTF of edges in total darkness within 0.01
-(tested). At 1.1 it would not; at 1.5 dots of a quarter of the tail remain about highlights."""
+_UNIFORM, _TEXTURED = 0.05, 0.3
+"""How far the result may depart from the smooth image, as a share of that, where the image about it is uniform and where it is
+not: light that has been spilled there from afar has no fine structure of its own. With these, straight edges up to a contrast
+of 10 : 1 stay untouched and the MTF of edges in total darkness within 0.01 (tested)."""
 
 _COARSE, _FINE = 1.25, 2.0
 """wavelength f-number / pitch. From _FINE on, the film samples the whole OTF and its point image is never negative; below
 _COARSE the bound holds in full; between the two it opens continuously."""
 
 _SINGLE_SUFFICES = 1e-4
-"""Of the image's root mean square. The rounding of a single-precision transform is about 3e-7 of that (measured), so a
-smooth image above this everywhere is known to 0.3 %; as a bound of a factor 1.3 it needs no more."""
+"""Of the image's root mean square. The rounding of a single-precision transform is about 1e-6 of that (measured), so a
+smooth image above this everywhere is known to 1 %; as a bound of 5 % and more it needs no more."""
 
 
 def cutoff_cycles_per_m(wavelength_nm: ArrayLike, f_number: float) -> NDArray[np.float64]:
@@ -69,14 +70,14 @@ def nyquist_contrast_loss(*, wavelength_nm: float, f_number: float, pitch_m: flo
     return 1.0 - float(diffraction_otf(0.5 / pitch_m, wavelength_nm=wavelength_nm, f_number=f_number))
 
 
-def ringing_bound(*, wavelength_nm: float, f_number: float, pitch_m: float) -> float:
-    """Return by what factor the result may depart from that of a filter without negative weights; inf where it need not be.
+def ringing_slack(*, wavelength_nm: float, f_number: float, pitch_m: float) -> float:
+    """Return how many times wider the bounds against ringing are than for coarse samples; inf where there are none.
 
-    Continuous in every argument: 1.3 for coarse samples, growing to infinity where the pitch is wavelength f_number / 2.
+    Continuous in every argument: 1 for coarse samples, growing to infinity where the pitch is wavelength f_number / 2.
     """
     fineness = wavelength_nm / NM_PER_M * f_number / pitch_m
     coarse = min(1.0, (_FINE - fineness) / (_FINE - _COARSE))
-    return _RINGING_FACTOR / coarse if coarse > 0 else math.inf
+    return 1.0 / coarse if coarse > 0 else math.inf
 
 
 class DiffractionFilter:
@@ -91,8 +92,12 @@ class DiffractionFilter:
     martucci1994: multiplication of DCT-II coefficients is convolution of the mirrored image.
     """
 
-    def __init__(self, rows: int, cols: int, *, pitch_m: float, workers: int = 1) -> None:
+    def __init__(self, planes: NDArray[Any], *, pitch_m: float, workers: int = 1) -> None:
+        """Prepare for images like `planes`, (rows, cols, planes): where they are uniform, so are all bands taken to be."""
         self._pitch_m, self._workers = pitch_m, workers
+        self._planes = planes
+        self._bound: NDArray[np.float64] | None = None
+        rows, cols = planes.shape[:2]
         # A DCT-II of n samples has its coefficients at k / (2 n) cycles per sample.
         across, down = np.arange(cols) / (2.0 * cols), np.arange(rows)[:, None] / (2.0 * rows)
         self._radius = np.hypot(down, across) / pitch_m
@@ -108,12 +113,18 @@ class DiffractionFilter:
         spectrum = scipy.fft.dctn(band, type=2, workers=self._workers)
         total = math.fsum(np.sum(band, axis=1))
         cutoff = float(cutoff_cycles_per_m(wavelength_nm, f_number))
-        factor = ringing_bound(wavelength_nm=wavelength_nm, f_number=f_number, pitch_m=self._pitch_m)
-        if math.isinf(factor):
+        slack = ringing_slack(wavelength_nm=wavelength_nm, f_number=f_number, pitch_m=self._pitch_m)
+        if math.isinf(slack):
             return without_negative_light(self._filtered(spectrum, self._radius, cutoff), total=total)
         smooth = self._smooth(spectrum, cutoff, rms=math.sqrt(float(np.vdot(band, band)) / band.size))
         exact = self._filtered(spectrum, self._radius, cutoff)
-        return without_ringing(exact, smooth, factor=factor, total=total)
+        return without_ringing(exact, smooth, bound=slack * self._bounds(), total=total)
+
+    def _bounds(self) -> NDArray[np.float64]:
+        """Return the bounds against ringing for coarse samples, made when first needed."""
+        if self._bound is None:
+            self._bound = _UNIFORM + (_TEXTURED - _UNIFORM) * texture(self._planes)
+        return self._bound
 
     def _smooth(self, spectrum: NDArray[np.float64], cutoff: float, *, rms: float) -> NDArray[Any]:
         """Return the image through the filter without negative weights, in single precision where that serves as a bound."""
@@ -150,7 +161,7 @@ def diffract_band(
     workers
         Threads of the transform; the result does not depend on it.
     """
-    blur = DiffractionFilter(*band.shape, pitch_m=pitch_m, workers=workers)
+    blur = DiffractionFilter(band[:, :, None], pitch_m=pitch_m, workers=workers)
     return blur.apply(band, wavelength_nm=wavelength_nm, f_number=f_number)
 
 

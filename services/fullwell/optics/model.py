@@ -38,6 +38,9 @@ IDEAL_LENS: Final = OpticsOptions()
 _BRIGHTEST = 1e38
 """Photons s^-1 m^-2 sr^-1 nm^-1; times the solid angle of the fastest lens this still fits single precision."""
 
+_TEXTURE_BANDS = 3
+"""Bands in which texture is looked for: the middles of the blue, green and red thirds."""
+
 _BANDS_AT_A_TIME = 8
 """Bands copied out of the (rows, cols, bands) cube together: one cache line of float32 is then read about twice."""
 
@@ -164,7 +167,10 @@ def _choose_blur(
         return NoBlur("diffraction: left out on request.")
     if not lens.diffraction:
         return NoBlur("diffraction: switched off in the lens.")
-    return DiffractionBlur(radiance.rows, radiance.cols, f_number=f_number, pitch_m=pitch_m, workers=workers)
+    # Bands of different colours, so that an edge between colours of equal brightness counts as one.
+    bands = {(2 * part + 1) * radiance.grid.count // (2 * _TEXTURE_BANDS) for part in range(_TEXTURE_BANDS)}
+    planes = radiance.photons[:, :, sorted(bands)]
+    return DiffractionBlur(planes, f_number=f_number, pitch_m=pitch_m, workers=workers)
 
 
 def _form_image(

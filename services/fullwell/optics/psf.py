@@ -41,8 +41,9 @@ _MOVED_SAMPLES = 0.5
 
 _MAX_KERNEL = 8191
 
-_RINGING_FACTOR = 1.5
-"""Wider than for diffraction alone: the smooth filter here is the integral over cells, which is blurred more."""
+_RINGING_BOUND = 0.5
+"""How far the result may depart from the smooth image, as a share of that. Wider than for diffraction alone: the smooth filter
+here is the integral over cells, which is blurred more."""
 
 _CUT_OTF = 0.25
 """OTF at the edge of the Nyquist square from which on samples count as coarse; there the bound holds in full."""
@@ -192,7 +193,7 @@ class PointSpreadFilter:
         self.contrast_loss = _worst_contrast_loss(image, pitch_m)
         """Largest |1 - OTF| up to the Nyquist frequency along a row or column, shifts included."""
         self._exact, self._smooth = _kernels(image, pitch_m)
-        self._factor = _ringing_factor(image, pitch_m)
+        self._bound = _ringing_bound(image, pitch_m)
         self._centred = max(abs(d) for d in image.centroid_m()) < _MOVED_SAMPLES * pitch_m
 
     @property
@@ -210,9 +211,9 @@ class PointSpreadFilter:
         elif found > 0:
             # What a lopsided point image loses at one border it need not gain at the other; the difference is tiny.
             exact *= total / found
-        if math.isinf(self._factor):
+        if math.isinf(self._bound):
             return without_negative_light(exact, total=total)
-        return without_ringing(exact, padded.convolved(self._smooth), factor=self._factor, total=total)
+        return without_ringing(exact, padded.convolved(self._smooth), bound=self._bound, total=total)
 
 
 class _Padded:
@@ -372,6 +373,6 @@ def _worst_contrast_loss(image: PointImage, pitch_m: float) -> float:
     return float(np.max(np.abs(1.0 - _along_axes(image, np.linspace(0.0, 0.5 / pitch_m, 9)))))
 
 
-def _ringing_factor(image: PointImage, pitch_m: float) -> float:
+def _ringing_bound(image: PointImage, pitch_m: float) -> float:
     cut = min(1.0, float(np.max(np.abs(_along_axes(image, np.array([0.5 / pitch_m]))))) / _CUT_OTF)
-    return _RINGING_FACTOR / cut if cut > 1e-9 else math.inf
+    return _RINGING_BOUND / cut if cut > 1e-9 else math.inf

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fullwell.optics import diffract_band, diffraction_otf
-from fullwell.optics.diffraction import ringing_bound
+from fullwell.optics.diffraction import ringing_slack
 
 MTF_TOLERANCE = 0.01
 """What the product promises for lens times pixel aperture up to the Nyquist frequency."""
@@ -19,8 +19,11 @@ ENERGY_TOLERANCE = 1e-6
 ROUNDING = 1e-12
 """Relative; double precision, and neighbouring sums of it."""
 
-TAIL_FACTOR = 1.9
-"""The bound of 1.3 about the smooth tail, which itself is 1.45 times its far form at the second sample."""
+TAIL_FACTOR = 1.6
+"""Of the far form of the tail: the bound of 1.05, and a smooth tail that at the second sample is 1.45 times its far form."""
+
+DOT_TOLERANCE = 1.05**2
+"""From one sample to the next: both bounds for spilled light."""
 
 WAVELENGTH_NM = 550.0
 OVERSAMPLING = 8
@@ -98,32 +101,31 @@ def test_a_highlight_fades_without_alternating_samples(pitch_um: float, f_number
     fineness = WAVELENGTH_NM * 1e-9 * f_number / pitch_m
     if fineness <= 1.25:
         distance = np.arange(1, 12)
-        tail = fineness / (math.pi * distance) ** 3
+        tail = fineness / (math.pi * distance**3 * math.pi**2)
         along = blurred[31, 32:43]
-        np.testing.assert_array_less(along[1:], TAIL_FACTOR * tail[1:])
-        np.testing.assert_array_less(tail[2:] / TAIL_FACTOR, along[2:])
+        # The sample itself lights the window of 7 x 7 about it, where the wider bounds hold.
+        np.testing.assert_array_less(along[3:], TAIL_FACTOR * tail[3:])
+        np.testing.assert_array_less(tail[3:] / TAIL_FACTOR, along[3:])
 
 
-def test_a_lamp_in_the_dark_leaves_no_dots() -> None:
-    """At 1e4 times the brightness of its ground: from the third sample on, no sample exceeds the one before by more than
-    the two bounds together allow (without them: 3 times, and next to darkness)."""
+@pytest.mark.parametrize("pitch_um", [1.4, 2.8, 6.0])
+def test_a_lamp_in_the_dark_leaves_no_dots(pitch_um: float) -> None:
+    """At 1e4 times the brightness of its ground, the light about it only falls (the OTF alone alternates by 3 times there)."""
     image = np.full((60, 80), 1e-4)
     image[28:32, 30:50] = 1.0
-    blurred = diffract_band(image, wavelength_nm=WAVELENGTH_NM, f_number=2.0, pitch_m=2.8e-6)
-    row, column = blurred[30, 52:64], blurred[34:46, 40]
-    assert np.all(row[1:] < 1.3**2 * row[:-1])
-    assert np.all(column[1:] < 1.3**2 * column[:-1])
+    blurred = diffract_band(image, wavelength_nm=WAVELENGTH_NM, f_number=2.0, pitch_m=pitch_um * 1e-6)
+    for line in (blurred[30, 53:66], blurred[35:48, 40]):
+        assert np.all(line[1:] < DOT_TOLERANCE * line[:-1])
 
 
-def test_the_bound_against_ringing_opens_continuously_to_none() -> None:
-    def bound(fineness: float) -> float:
-        return ringing_bound(wavelength_nm=500.0, f_number=2.0, pitch_m=1e-6 / fineness)
+def test_the_bounds_against_ringing_open_continuously_to_none() -> None:
+    def slack(fineness: float) -> float:
+        return ringing_slack(wavelength_nm=500.0, f_number=2.0, pitch_m=1e-6 / fineness)
 
-    assert bound(0.01) == bound(1.25) == 1.3
-    assert math.isinf(bound(2.0))
-    assert math.isinf(bound(6.0))
-    fineness = np.linspace(1.2, 1.99, 200)
-    openness = 1 / np.array([bound(f) for f in fineness])
+    assert slack(0.01) == slack(1.25) == 1.0
+    assert math.isinf(slack(2.0))
+    assert math.isinf(slack(6.0))
+    openness = 1 / np.array([slack(f) for f in np.linspace(1.2, 1.99, 200)])
     assert np.max(np.abs(np.diff(openness))) < 0.01
 
 

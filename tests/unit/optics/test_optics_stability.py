@@ -163,7 +163,7 @@ def test_bounding_keeps_the_sum_one_by_one_and_all_at_once(shape: tuple[int, int
     chosen = rng.choice(smooth.size, size=1 if few else max(1, smooth.size // 3), replace=False)
     exact.flat[chosen] *= rng.choice([-1.0, 0.1, 4.0], size=len(chosen))
     total = float(np.sum(np.abs(exact)))
-    found = without_ringing(exact.copy(), smooth, factor=1.5, total=total)
+    found = without_ringing(exact.copy(), smooth, bound=0.5, total=total)
     assert np.sum(found) == pytest.approx(total, rel=1e-12)
     assert np.min(found) > 0
     positive = without_negative_light(exact.copy(), total=total)
