@@ -26,6 +26,9 @@ __all__ = [
     "write_psf",
 ]
 
+_ROUNDING = 1e-9
+"""Below this a number is what rounding left of nothing."""
+
 _CORE_SAMPLES = 257
 """Spread functions larger than this keep their exact transfer function for the middle; the rest, smooth at the scale of the
 film's samples, is summed into them."""
@@ -299,7 +302,7 @@ def _kernels(image: PointImage, pitch_m: float) -> tuple[NDArray[np.float64], ND
         )
     core, rest = _core_and_rest(image.weights)
     # Samples farther apart than the film's say nothing about its highest frequencies.
-    factor = math.ceil(image.spacing_m / pitch_m - 1e-9)
+    factor = math.ceil(image.spacing_m / pitch_m - _ROUNDING)
     if factor > 1:
         core = _refined(core, factor)
     spacing_m = image.spacing_m / max(1, factor)
@@ -375,4 +378,4 @@ def _worst_contrast_loss(image: PointImage, pitch_m: float) -> float:
 
 def _ringing_bound(image: PointImage, pitch_m: float) -> float:
     cut = min(1.0, float(np.max(np.abs(_along_axes(image, np.array([0.5 / pitch_m]))))) / _CUT_OTF)
-    return _RINGING_BOUND / cut if cut > 1e-9 else math.inf
+    return _RINGING_BOUND / cut if cut > _ROUNDING else math.inf

@@ -31,6 +31,9 @@ __all__ = [
 
 DEFOCUS_INDEX: Final = 4
 
+_ROUNDING = 1e-9
+"""Relative slack for lengths that are equal but were computed in different ways."""
+
 _FEWEST_SAMPLES, _MOST_SAMPLES = 256, 2048
 """Samples across the pupil: from an accuracy of the OTF of 5e-4 (tested) to what memory holds."""
 
@@ -160,7 +163,7 @@ def wavefront_error_m(
     """
     defined_m = wavefront.pupil_diameter_m or pupil_diameter_m
     shrink = pupil_diameter_m / defined_m
-    if shrink > 1 + 1e-9:
+    if shrink > 1 + _ROUNDING:
         raise FieldError(
             f"pupil_diameter_m is {defined_m} but the lens's pupil measures {pupil_diameter_m} m; Zernike polynomials must not "
             "be extrapolated. Give coefficients for the wider pupil or raise lens.f_number.",
@@ -263,7 +266,7 @@ def oversampling_for(wavelength_nm: float, f_number: float, pitch_m: float | Non
     """Return the samples per wavelength f_number that put the point image on a spacing of at most `pitch_m`; at least 2."""
     if pitch_m is None:
         return 2
-    return max(2, math.ceil(wavelength_nm / NM_PER_M * f_number / pitch_m - 1e-9))
+    return max(2, math.ceil(wavelength_nm / NM_PER_M * f_number / pitch_m - _ROUNDING))
 
 
 def _samples_across(wavefront: Wavefront, wavelength_nm: float, pupil_diameter_m: float) -> int:
