@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import structlog
 
@@ -22,13 +22,16 @@ from fullwell.core import (
     ServiceError,
     ShapeError,
 )
-from fullwell.core.settings import Settings
+from fullwell.core.settings import Settings, load_settings
 from fullwell.jobs.processes import current_process
 from fullwell.jobs.records import Lease, RetryRule
 from fullwell.jobs.repository import JobRepository
 from fullwell.schema import RecipeBuilder, RecipeDocument, load_recipe
 from fullwell.storage import ObjectStore
 from fullwell_worker.materials import JobFolder
+
+if TYPE_CHECKING:
+    from fullwell.pipeline import StageStore
 
 __all__ = [
     "CurrentJob",
@@ -80,11 +83,15 @@ class FrameRunner(Protocol):
 
 
 class PipelineRunner:
-    """Runs frames with the real pipeline; keeps what builds the frames of the job at hand, with the models it has read."""
+    """Runs frames with the real pipeline; keeps what builds the frames of the job at hand, with the models it has read.
+
+    Radiance images go to the stage cache in the store that holds the products: all workers of a service share it.
+    """
 
     def __init__(self) -> None:
         self._document: RecipeDocument | None = None
         self._builder: RecipeBuilder | None = None
+        self._stages: StageStore | None = None
 
     def __call__(
         self,
@@ -98,11 +105,23 @@ class PipelineRunner:
         should_cancel: Callable[[], bool] | None,
     ) -> Any:
         """Return the manifest of the published frame."""
-        from fullwell.pipeline import run_frame  # noqa: PLC0415 - loads the renderer: in the child, at its first frame
+        from fullwell.pipeline import StageStore, run_frame  # noqa: PLC0415 - loads the renderer: in the child, at its first frame
 
+        if self._stages is None or self._stages.store is not store:
+            limit = load_settings().cache_bytes
+            self._stages = StageStore(store, max_bytes=limit) if limit else None
         if self._builder is None or self._document is not document:
             self._document, self._builder = document, RecipeBuilder(document, base_dir=base_dir)
-        return run_frame(document, index, store, prefix, builder=self._builder, progress=progress, should_cancel=should_cancel)
+        return run_frame(
+            document,
+            index,
+            store,
+            prefix,
+            builder=self._builder,
+            stages=self._stages,
+            progress=progress,
+            should_cancel=should_cancel,
+        )
 
 
 frame_runner: FrameRunner = PipelineRunner()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,6 +15,7 @@ from fullwell.core.errors import FieldError, NotFoundError
 if TYPE_CHECKING:
     from rich.progress import Progress
 
+    from fullwell.pipeline import StageStore
     from fullwell.schema import RecipeDocument
 
 __all__ = ["register"]
@@ -21,6 +23,15 @@ __all__ = ["register"]
 RecipeArgument = Annotated[Path, typer.Argument(help="Recipe file, YAML or JSON.", metavar="RECIPE")]
 SetOption = Annotated[
     list[str] | None, typer.Option("--set", help="Override one value: path=value, for example quality.samples_per_pixel=16.")
+]
+CacheOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--cache",
+        metavar="DIR",
+        help="Folder whose cache/ keeps radiance images between runs; default FULLWELL_HOME where it is set, else the user's "
+        "cache folder. FULLWELL_CACHE_BYTES bounds it; 0 turns it off.",
+    ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Report as JSON.")]
 
@@ -41,6 +52,8 @@ def render(
     overrides: SetOption = None,
     frames: Annotated[str | None, typer.Option(help="Frames to make: one number, or A-B with both ends included.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace frames that were made from another recipe.")] = False,
+    cache: CacheOption = None,
+    no_cache: Annotated[bool, typer.Option("--no-cache", help="Render everything anew and keep nothing.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Make the frames of a recipe on this machine, in this process."""
@@ -54,6 +67,7 @@ def render(
     builder.validate()  # a frame that cannot be made is found before the first one is
     folder = output if output is not None else Path("out") / document.name
     store = LocalStore(folder)
+    stages = None if no_cache else _stage_store(cache)
     finished: list[dict[str, Any]] = []
     with _progress(quiet=as_json) as bars:
         total = bars.add_task(document.name, total=len(wanted))
@@ -68,6 +82,7 @@ def render(
                 store,
                 prefix,
                 builder=builder,
+                stages=stages,
                 progress=lambda at, bar=bar, index=index: bars.update(  # type: ignore[misc]
                     bar, completed=at.fraction, description=f"frame {index}: {at.stage}"
                 ),
@@ -80,6 +95,10 @@ def render(
         return
     for item in finished:
         print(f"frame {item['index']}: {item['folder']} ({', '.join(item['products'])})")
+    reused = [entry for item in finished for entry in item["cache"] if entry["result"] == "hit"]
+    if reused:
+        saved_s = sum(entry["saved_wall_s"] for entry in reused)
+        print(f"note: {len(reused)} radiance image(s) came from the cache, which saved {saved_s:.3g} s of rendering")
     for warning in sorted({warning for item in finished for warning in item["warnings"]}):
         print(f"note: {warning}")
 
@@ -91,7 +110,26 @@ def _summary(folder: Path, index: int, manifest: dict[str, Any]) -> dict[str, An
         "products": [product["name"] for product in manifest["products"]],
         "warnings": manifest["warnings"],
         "seconds": manifest["run"]["seconds"],
+        "cache": manifest["run"].get("cache", []),
     }
+
+
+def _stage_store(folder: Path | None) -> StageStore | None:
+    """Return the stage cache of commands in `folder` or at its usual place; None where the settings turn it off."""
+    from fullwell.core.settings import load_settings
+    from fullwell.pipeline import StageStore
+    from fullwell.storage import LocalStore
+
+    limit = load_settings().cache_bytes
+    return StageStore(LocalStore(folder or _cache_folder()), max_bytes=limit) if limit else None
+
+
+def _cache_folder() -> Path:
+    """Return the folder that FULLWELL_HOME names, else ``fullwell`` in the user's cache folder, by the XDG rule."""
+    if home := os.environ.get("FULLWELL_HOME"):
+        return Path(home).expanduser()
+    given = os.environ.get("XDG_CACHE_HOME", "")
+    return (Path(given) if given.startswith("/") else Path.home() / ".cache") / "fullwell"
 
 
 def _forget_other(store: Any, prefix: str, document: RecipeDocument, index: int) -> None:

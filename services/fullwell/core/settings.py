@@ -48,6 +48,8 @@ class Settings(BaseSettings):
     max_blob_bytes: int = Field(default=2048 * MIB, ge=1024)
     max_frames_per_job: int = Field(default=100_000, ge=1)
 
+    cache_bytes: int = Field(default=8192 * MIB, ge=0)
+
     lease_s: float = Field(default=30.0, ge=1.0, le=3600.0)
     reap_interval_s: float = Field(default=2.0, ge=0.1, le=60.0)
     max_attempts: int = Field(default=3, ge=1, le=100)

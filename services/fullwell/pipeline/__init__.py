@@ -5,6 +5,7 @@ from fullwell.pipeline.frame import MANIFEST_NAME, MANIFEST_SCHEMA, render_frame
 from fullwell.pipeline.plan import FramePlan, PlanStep, plan_document, plan_frame
 from fullwell.pipeline.progress import CancelCheck, FrameProgress, ProgressCallback
 from fullwell.pipeline.run import run_frame
+from fullwell.pipeline.stage_store import StageStore
 
 __all__ = [
     "MANIFEST_NAME",
@@ -15,6 +16,7 @@ __all__ = [
     "PlanStep",
     "ProgressCallback",
     "RadianceCache",
+    "StageStore",
     "plan_document",
     "plan_frame",
     "render_frame",

@@ -1,15 +1,45 @@
-"""Radiance images kept in memory between frames: a sweep over exposures or sensors renders once."""
+"""Radiance images kept between frames: in this process's memory, and behind that in the object store that workers share."""
 
 from __future__ import annotations
 
+import functools
+import importlib.metadata
+import json
+import math
+import platform
+import struct
+import time
 from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
 
-from fullwell.radiometry import RadianceImage
-from fullwell.render import RenderStatistics
+import numpy as np
+import structlog
+from numpy.typing import NDArray
 
-__all__ = ["RadianceCache"]
+import fullwell
+from fullwell.core.hashing import canonical_json, digest_of, sha256_file
+from fullwell.pipeline.stage_store import StageStore
+from fullwell.radiometry import RadianceImage, WavelengthGrid
+from fullwell.render import RenderStatistics, choose_variant
 
+__all__ = ["ObtainedRadiance", "RadianceCache", "decode_radiance", "encode_radiance", "obtain_radiance", "stored_radiance_key"]
+
+KIND = "radiance"
+_ENTRY_VERSION = 1
 _MAX_BYTES = 1 << 30
+_ALIGNMENT = 64
+_FLOAT_BYTES = 4
+_LENGTH = struct.Struct("<I")
+_MAKERS = ("core", "radiometry", "scene", "render")
+"""The packages whose code decides a radiance image, beside those whose versions are named."""
+_INSTRUCTION_SETS = ("fma", "avx", "avx2", "avx512f", "neon", "asimd", "sve")
+
+Rendered = tuple[RadianceImage, RenderStatistics]
+
+log = structlog.get_logger("fullwell.cache")
 
 
 class RadianceCache:
@@ -17,9 +47,9 @@ class RadianceCache:
 
     def __init__(self, max_bytes: int = _MAX_BYTES) -> None:
         self._max_bytes = max_bytes
-        self._entries: OrderedDict[str, tuple[RadianceImage, RenderStatistics]] = OrderedDict()
+        self._entries: OrderedDict[str, Rendered] = OrderedDict()
 
-    def get(self, key: str) -> tuple[RadianceImage, RenderStatistics] | None:
+    def get(self, key: str) -> Rendered | None:
         """Return the image of a key and what it took to render, or None."""
         entry = self._entries.get(key)
         if entry is not None:
@@ -34,3 +64,197 @@ class RadianceCache:
         self._entries.move_to_end(key)
         while sum(kept.photons.nbytes for kept, _ in self._entries.values()) > self._max_bytes:
             self._entries.popitem(last=False)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ObtainedRadiance:
+    """A radiance image, and where it came from.
+
+    Attributes
+    ----------
+    image, statistics
+        As rendered, by this process or by the one that kept them: the same bytes.
+    source
+        "memory" and "store" are hits; "render" is a miss.
+    stored_as
+        Address of the entry in the object store, or None where no stage store takes part.
+    waited_s
+        Time spent on waiting for another worker that was rendering the same.
+    seconds
+        Time that all of it took, rendering and waiting included.
+    """
+
+    image: RadianceImage
+    statistics: RenderStatistics
+    source: Literal["memory", "store", "render"]
+    stored_as: str | None
+    waited_s: float
+    seconds: float
+
+    def document(self) -> dict[str, Any]:
+        """Return what a manifest says about it; `saved` is what the rendering had cost where and when it was done."""
+        hit = self.source != "render"
+        return {
+            "stage": KIND,
+            "result": "hit" if hit else "miss",
+            "source": self.source,
+            "object": self.stored_as,
+            "bytes": _content_bytes(self.image.rows, self.image.cols, self.image.grid.count),
+            "seconds": round(self.seconds, 4),
+            "waited_s": round(self.waited_s, 4),
+            "saved_wall_s": round(self.statistics.wall_s, 4) if hit else 0.0,
+            "saved_cpu_s": round(self.statistics.cpu_s, 4) if hit else 0.0,
+        }
+
+
+def obtain_radiance(
+    key: str,
+    render: Callable[[], Rendered],
+    *,
+    shape: tuple[int, int, int],
+    memory: RadianceCache,
+    stages: StageStore | None = None,
+    tick: Callable[[], None] = lambda: None,
+) -> ObtainedRadiance:
+    """Return the radiance image of a key from memory, from the object store, or from `render`, and keep it in both.
+
+    Parameters
+    ----------
+    key
+        What decides the image's bytes: `radiance_key`.
+    render
+        Makes the image; its errors are passed on.
+    shape
+        (rows, cols, bands): an image that the store would not take is not waited for.
+    stages
+        The cache shared with other workers; None leaves it out.
+    tick
+        Called while another worker is waited for; may raise, to cancel.
+    """
+    started = time.perf_counter()
+    waited_s = 0.0
+    if stages is not None and _content_bytes(*shape) > stages.max_bytes:
+        stages = None
+    stored_key = stored_radiance_key(key) if stages is not None else ""
+
+    def obtained(rendered: Rendered, source: Literal["memory", "store", "render"]) -> ObtainedRadiance:
+        if source != "memory":
+            memory.put(key, *rendered)
+        address = None if stages is None else stages.address(KIND, stored_key)
+        return ObtainedRadiance(*rendered, source, address, waited_s, time.perf_counter() - started)
+
+    if (kept := memory.get(key)) is not None:
+        if stages is not None:
+            stages.touch(KIND, stored_key)  # used, though not read: it must not be the next one to be evicted
+        return obtained(kept, "memory")
+    if stages is None:
+        return obtained(render(), "render")
+    if (found := _read(stages, stored_key, shape)) is not None:
+        return obtained(found, "store")
+    with stages.turn(KIND, stored_key, tick=tick) as turn:
+        waited_s = turn.waited_s
+        # Another worker may have finished between the look above and the lease, or while it was waited for.
+        if (found := _read(stages, stored_key, shape)) is not None:
+            return obtained(found, "store")
+        rendered = render()
+        stages.put(KIND, stored_key, *encode_radiance(*rendered))
+        return obtained(rendered, "render")
+
+
+def _read(stages: StageStore, stored_key: str, shape: tuple[int, int, int]) -> Rendered | None:
+    content = stages.get(KIND, stored_key)
+    if content is None:
+        return None
+    try:
+        image, statistics = decode_radiance(content)
+        if image.photons.shape != shape:
+            raise ValueError(f"its shape is {image.photons.shape}, not {shape}")
+    except Exception as error:  # intact as an object, yet of no use: whatever it is, it must not fail the frame
+        log.warning("unusable cache entry", key=stored_key, cause=str(error))
+        stages.discard(KIND, stored_key)
+        return None
+    return image, statistics
+
+
+def stored_radiance_key(key: str) -> str:
+    """Return the key of an entry that outlives this process: beside the image's own key, who would compute it.
+
+    Another version of the rendering code, of the compiler or of the instruction set rounds otherwise, so it has entries of
+    its own: a hit gives the bytes that rendering here would give.
+    """
+    return digest_of({"radiance": key, "entry_version": _ENTRY_VERSION, "maker": _maker()})
+
+
+@functools.cache
+def _maker() -> dict[str, Any]:
+    root = Path(fullwell.__file__).parent
+    files = sorted(file for package in _MAKERS for file in (root / package).rglob("*.py"))
+    return {
+        "code": digest_of([[file.relative_to(root).as_posix(), sha256_file(file)] for file in files]),
+        "versions": {name: importlib.metadata.version(name) for name in ("mitsuba", "drjit", "numpy")},
+        "llvm": choose_variant().llvm_version,
+        "machine": platform.machine(),
+        "instruction_sets": _instruction_sets(),
+    }
+
+
+def _instruction_sets() -> list[str]:
+    """Return those of the instruction sets that change rounding or the order of sums which this processor has."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return [platform.processor()]
+    flags = next((line.partition(":")[2].split() for line in lines if line.startswith(("flags", "Features"))), [])
+    return [name for name in _INSTRUCTION_SETS if name in flags]
+
+
+def encode_radiance(image: RadianceImage, statistics: RenderStatistics) -> tuple[bytes | memoryview, ...]:
+    """Return an exact encoding, in parts to be joined: length and JSON of the header, then the arrays as they are.
+
+    Nothing is compressed: half of a Monte-Carlo image's bits are noise, and saving a fifth of the size costs twenty times
+    the time of writing it. The header is padded, so that the arrays lie aligned.
+    """
+    header = canonical_json(
+        {
+            "shape": list(image.photons.shape),
+            "grid": [image.grid.first_nm, image.grid.last_nm, image.grid.step_nm],
+            "tangent_pitch": image.tangent_pitch,
+            "standard_error": image.standard_error is not None,
+            "statistics": asdict(statistics),
+        }
+    )
+    header += b" " * (-(_LENGTH.size + len(header)) % _ALIGNMENT)
+    arrays = [image.photons] if image.standard_error is None else [image.photons, image.standard_error]
+    return _LENGTH.pack(len(header)), header, *(_bytes_of(array) for array in arrays)
+
+
+def decode_radiance(content: bytes | memoryview) -> Rendered:
+    """Return what was encoded, bit for bit, in arrays of its own. Raises an error of any kind for other content."""
+    content = memoryview(content)
+    (length,) = _LENGTH.unpack_from(content)
+    header = json.loads(bytes(content[_LENGTH.size : _LENGTH.size + length]))
+    rows, cols, bands = (int(count) for count in header["shape"])
+    shapes: list[tuple[int, ...]] = [(rows, cols, bands), *([(rows, cols)] if header["standard_error"] else [])]
+    at = _LENGTH.size + length
+    if len(content) != at + _FLOAT_BYTES * sum(math.prod(shape) for shape in shapes):
+        raise ValueError(f"{len(content)} bytes do not hold arrays of the shapes {shapes}")
+    arrays = []
+    for shape in shapes:
+        flat = np.frombuffer(content, dtype="<f4", count=math.prod(shape), offset=at)
+        arrays.append(flat.reshape(shape).astype(np.float32))
+        at += flat.nbytes
+    first_nm, last_nm, step_nm = header["grid"]
+    error = arrays[1] if header["standard_error"] else None
+    image = RadianceImage(arrays[0], WavelengthGrid(first_nm, last_nm, step_nm), header["tangent_pitch"], error)
+    return image, RenderStatistics(**header["statistics"])
+
+
+def _bytes_of(array: NDArray[np.float32]) -> memoryview:
+    if array.dtype != np.float32:
+        raise TypeError(f"the array is {array.dtype}; must be float32")
+    return np.ascontiguousarray(array, dtype="<f4").data.cast("B")
+
+
+def _content_bytes(rows: int, cols: int, bands: int) -> int:
+    """Return the size of an entry's arrays."""
+    return _FLOAT_BYTES * rows * cols * (bands + 1)

@@ -20,11 +20,12 @@ from fullwell.dataset.dng import check_dng_pattern, encode_raw_dng
 from fullwell.isp import scene_illuminant
 from fullwell.labels import Labels, labels_document, make_labels
 from fullwell.optics import OpticsOptions
-from fullwell.pipeline.cache import RadianceCache
+from fullwell.pipeline.cache import ObtainedRadiance, RadianceCache, obtain_radiance
 from fullwell.pipeline.camera_chain import develop_picture, form_image, take_picture
 from fullwell.pipeline.keys import frame_digest, radiance_key
 from fullwell.pipeline.plan import FramePlan, plan_document, plan_frame
 from fullwell.pipeline.progress import CancelCheck, FrameProgress, ProgressCallback
+from fullwell.pipeline.stage_store import StageStore
 from fullwell.radiometry import RadianceImage
 from fullwell.render import RenderStatistics, choose_variant, query_surfaces, render_radiance
 from fullwell.scene import Camera, Film
@@ -47,10 +48,13 @@ def render_frame(
     prefix: str,
     *,
     cache: RadianceCache | None = None,
+    stages: StageStore | None = None,
     progress: ProgressCallback | None = None,
     should_cancel: CancelCheck | None = None,
 ) -> dict[str, Any]:
     """Make the products that a frame asks for, publish them under `prefix`, and return the manifest.
+
+    Radiance images are taken from `cache` (memory) and `stages` (shared with other workers) and kept in both.
 
     A frame that is published already is returned at once, so running twice does nothing twice. Products are complete before
     the manifest appears; what a crash leaves behind is products without a manifest, which nobody reads and the next run
@@ -70,7 +74,7 @@ def render_frame(
     if published is not None:
         return published
     _check_products(frame)
-    run = _Run(frame, plan_frame(frame), cache or RadianceCache(), progress, should_cancel)
+    run = _Run(frame, plan_frame(frame), cache or RadianceCache(), stages, progress, should_cancel)
     for position, rig in enumerate(frame.cameras):
         _camera_products(run, rig, position)
     run.report("store", 0.98)
@@ -122,11 +126,13 @@ class _Run:
     frame: FrameDescription
     plan: FramePlan
     cache: RadianceCache
+    stage_store: StageStore | None
     progress: ProgressCallback | None
     should_cancel: CancelCheck | None
     products: dict[str, bytes] = field(default_factory=dict)
     cameras: list[dict[str, Any]] = field(default_factory=list)
     stages: list[dict[str, Any]] = field(default_factory=list)
+    cached: list[dict[str, Any]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     instance_table: tuple[tuple[str, int], ...] = ()
     started: float = field(default_factory=time.time)
@@ -206,26 +212,40 @@ def _add(run: _Run, name: str, encoder: Any) -> None:
 
 
 def _radiance(run: _Run, rig: CameraRig, base: float, share: float) -> tuple[RadianceImage, RenderStatistics, str]:
-    frame = run.frame
+    frame, name, film = run.frame, rig.camera.name, rig.camera.film
     key = radiance_key(frame, rig, variant=choose_variant().variant)
-    kept = run.cache.get(key)
-    if kept is not None:
-        run.notes.append(f"{rig.camera.name}: radiance reused from an earlier frame of this run (key {key[:12]})")
-        return (*kept, key)
-    run.report("render", base)
-    with run.stage(f"{rig.camera.name}: render"):
-        image, statistics = render_radiance(
-            frame.scene,
-            rig.camera,
-            frame.grid,
-            samples_per_pixel=frame.quality.samples_per_pixel,
-            max_depth=frame.quality.max_depth,
-            seed=seed32(frame.seed, "radiance", key),
-            progress=lambda fraction: run.report("render", base + share * fraction),
-            should_cancel=run.should_cancel,
-        )
-    run.cache.put(key, image, statistics)
-    return image, statistics, key
+
+    def render() -> tuple[RadianceImage, RenderStatistics]:
+        run.report("render", base)
+        with run.stage(f"{name}: render"):
+            return render_radiance(
+                frame.scene,
+                rig.camera,
+                frame.grid,
+                samples_per_pixel=frame.quality.samples_per_pixel,
+                max_depth=frame.quality.max_depth,
+                seed=seed32(frame.seed, "radiance", key),
+                progress=lambda fraction: run.report("render", base + share * fraction),
+                should_cancel=run.should_cancel,
+            )
+
+    obtained = obtain_radiance(
+        key,
+        render,
+        shape=(film.rows, film.cols, frame.grid.count),
+        memory=run.cache,
+        stages=run.stage_store,
+        tick=lambda: run.report("wait for another worker", base),
+    )
+    run.cached.append({"camera": name, "key": key, **obtained.document()})
+    if obtained.source != "render":
+        run.notes.append(_reuse_note(name, key, obtained))
+    return obtained.image, obtained.statistics, key
+
+
+def _reuse_note(camera: str, key: str, obtained: ObtainedRadiance) -> str:
+    source = "an earlier frame of this run" if obtained.source == "memory" else "the stage cache"
+    return f"{camera}: radiance reused from {source} (key {key[:12]}); rendering it took {obtained.statistics.wall_s:.3g} s"
 
 
 def _radiance_document(image: RadianceImage, statistics: RenderStatistics, key: str) -> dict[str, Any]:
@@ -377,6 +397,7 @@ def _manifest(run: _Run, digest: str, products: list[dict[str, Any]]) -> dict[st
             "started_unix_s": round(run.started, 3),
             "seconds": round(time.time() - run.started, 3),
             "stages": run.stages,
+            "cache": run.cached,
             "notes": run.notes,
         },
     }

@@ -8,6 +8,7 @@ from typing import Any
 from fullwell.pipeline.cache import RadianceCache
 from fullwell.pipeline.frame import render_frame
 from fullwell.pipeline.progress import CancelCheck, FrameProgress, ProgressCallback
+from fullwell.pipeline.stage_store import StageStore
 from fullwell.schema import RecipeBuilder, RecipeDocument
 from fullwell.storage import ObjectStore
 
@@ -25,16 +26,19 @@ def run_frame(
     *,
     base_dir: Path | None = None,
     builder: RecipeBuilder | None = None,
+    stages: StageStore | None = None,
     progress: ProgressCallback | None = None,
     should_cancel: CancelCheck | None = None,
 ) -> dict[str, Any]:
     """Build frame `index` of the recipe, make it, publish it under `prefix` and return its manifest.
 
     `base_dir` is the folder that the recipe's file names are relative to; `builder`, made once for the same document, spares
-    successive frames from reading its models again. Errors and idempotence are those of
-    `render_frame`; a frame number that the recipe does not have is a FieldError.
+    successive frames from reading its models again; `stages` keeps radiance images for later runs and other workers. Errors
+    and idempotence are those of `render_frame`; a frame number that the recipe does not have is a FieldError.
     """
     if progress is not None:
         progress(FrameProgress("load", 0.0))
     frame = (builder or RecipeBuilder(document, base_dir=base_dir)).frame(index)
-    return render_frame(frame, store, prefix, cache=_process_cache, progress=progress, should_cancel=should_cancel)
+    return render_frame(
+        frame, store, prefix, cache=_process_cache, stages=stages, progress=progress, should_cancel=should_cancel
+    )
