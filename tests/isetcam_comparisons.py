@@ -720,6 +720,11 @@ def metrics_color(read: Reader) -> Comparison:
     result.same(metrics.delta_e_1976(one, two), data["deltaE1976"], "dE76")
     result.same(metrics.delta_e_1994(one, two), data["deltaE1994"], "dE94")
     result.same(metrics.delta_e_2000(one, two), data["deltaE2000"], "dE2000")
+    linear = isetcam_metrics.xyz_to_linear_srgb(np.array(data["xyz1"]) / 100.0)
+    result.same(linear, data["lrgb"], "lrgb")
+    result.same(isetcam_metrics.encode_srgb(linear), data["srgb_of_xyz1_over100"], "srgb")
+    values, encoded = np.array(data["lrgb2srgb"]).T
+    result.same(isetcam_metrics.encode_srgb(values), encoded, "lrgb2srgb")
     case = data["sensor_snr"]
     found = isetcam_metrics.sensor_snr_db(
         case["volts"],

@@ -19,6 +19,7 @@ from fullwell.metrics.colour_difference import delta_e_2000
 
 __all__ = [
     "SlantedEdge",
+    "encode_srgb",
     "iso12233",
     "pixel_dynamic_range_db",
     "s_cielab",
@@ -29,6 +30,7 @@ __all__ = [
     "sensor_snr_db",
     "visual_snr",
     "xyz_to_lab",
+    "xyz_to_linear_srgb",
 ]
 
 Observer = Literal[2, 10]
@@ -210,6 +212,21 @@ def pixel_dynamic_range_db(
 
 
 # S-CIELAB ------------------------------------------------------------------------------------------------------------
+
+
+_XYZ_TO_SRGB: Final = np.array([[3.2410, -1.5374, -0.4986], [-0.9692, 1.8760, 0.0416], [0.0556, -0.2040, 1.0570]])
+"""The draft of IEC 61966-2-1, with four decimals."""
+
+
+def xyz_to_linear_srgb(xyz: ArrayLike) -> NDArray[np.float64]:
+    """Return linear sRGB (..., 3), not clipped, of XYZ whose white has Y = 1 (..., 3)."""
+    return np.asarray(np.asarray(xyz, dtype=np.float64) @ _XYZ_TO_SRGB.T)
+
+
+def encode_srgb(linear: ArrayLike) -> NDArray[np.float64]:
+    """Return sRGB-encoded values of linear ones, same shape, clipped to 0 to 1 first; 1 becomes 1.055 - 0.055."""
+    clipped = np.clip(np.asarray(linear, dtype=np.float64), 0.0, 1.0)
+    return np.where(clipped > 0.0031308, 1.055 * clipped ** (1 / 2.4) - 0.055, 12.92 * clipped)
 
 
 def xyz_to_lab(xyz: ArrayLike, white_xyz: ArrayLike) -> NDArray[np.float64]:
