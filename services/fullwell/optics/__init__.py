@@ -2,9 +2,15 @@
 
 from fullwell.optics.camera_equation import on_axis_factor_sr, projected_solid_angle_sr, working_f_number
 from fullwell.optics.defocus import circle_of_confusion_px, defocus, defocus_layers
-from fullwell.optics.diffraction import airy_radius_m, cutoff_cycles_per_m, diffract_band, diffraction_otf
+from fullwell.optics.diffraction import (
+    airy_radius_m,
+    cutoff_cycles_per_m,
+    diffract_band,
+    diffraction_otf,
+    nyquist_contrast_loss,
+)
 from fullwell.optics.flare import Aperture, aperture_mask, flare_point_image
-from fullwell.optics.model import IDEAL_LENS, OPTICS_TERMS, OpticsTerm, compute_irradiance
+from fullwell.optics.model import IDEAL_LENS, MAX_SKIPPED_CONTRAST_LOSS, OPTICS_TERMS, OpticsTerm, compute_irradiance
 from fullwell.optics.parameters import OpticsOptions
 from fullwell.optics.psf import PointImage, PointSpread, PointSpreadFilter, gaussian_psf, pillbox_psf, read_psf, write_psf
 from fullwell.optics.relative_illumination import cos_fourth, disc_falloff, relative_illumination
@@ -21,6 +27,7 @@ from fullwell.scene.images import OpticalImage
 
 __all__ = [
     "IDEAL_LENS",
+    "MAX_SKIPPED_CONTRAST_LOSS",
     "OPTICS_TERMS",
     "Aperture",
     "OpticalImage",
@@ -45,6 +52,7 @@ __all__ = [
     "disc_falloff",
     "flare_point_image",
     "gaussian_psf",
+    "nyquist_contrast_loss",
     "on_axis_factor_sr",
     "pillbox_psf",
     "projected_solid_angle_sr",

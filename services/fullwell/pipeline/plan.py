@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from fullwell.optics import MAX_SKIPPED_CONTRAST_LOSS, nyquist_contrast_loss, working_f_number
 from fullwell.scene import Dielectric
 from fullwell.schema.frame import CameraRig, FrameDescription
 
@@ -87,9 +88,27 @@ def _camera_steps(frame: FrameDescription, rig: CameraRig, radiance: bool, optic
         )
     elif optics:
         steps.extend(_blur_steps(rig))
-    if optics and not camera.lens.diffraction:
-        steps.append(PlanStep(f"{camera.name}: diffraction", "skip", "the recipe turns it off", "not bounded: asked for"))
+        steps.append(_diffraction_step(frame, rig))
     return steps
+
+
+def _diffraction_step(frame: FrameDescription, rig: CameraRig) -> PlanStep:
+    """Say in which bands diffraction takes part; it is left out where the film is too coarse to show it."""
+    what, lens = f"{rig.camera.name}: diffraction", rig.camera.lens
+    if not lens.diffraction:
+        return PlanStep(what, "skip", "the recipe turns it off", "not bounded: asked for")
+    if any(part is not None for part in (rig.optics.psf, rig.optics.wavefront, rig.optics.aperture)):
+        return PlanStep(what, "run", "as part of the lens's point image")
+    f_number = working_f_number(lens.f_number, lens.magnification)
+    losses = [
+        nyquist_contrast_loss(wavelength_nm=float(nm), f_number=f_number, pitch_m=rig.camera.film.pitch_m)
+        for nm in frame.grid.centres_nm
+    ]
+    skipped = [loss for loss in losses if loss <= MAX_SKIPPED_CONTRAST_LOSS]
+    bound = f"contrast at Nyquist too high by at most {max(skipped):.2g}" if skipped else "none"
+    if len(skipped) == len(losses):
+        return PlanStep(what, "skip", "the samples are too coarse to show it", bound)
+    return PlanStep(what, "run", f"in {len(losses) - len(skipped)} of {len(losses)} bands, where the samples show it", bound)
 
 
 def _blur_steps(rig: CameraRig) -> list[PlanStep]:

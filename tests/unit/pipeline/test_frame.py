@@ -186,3 +186,15 @@ def test_plan_says_what_is_skipped_and_why(recipe: dict[str, Any]) -> None:
     assert plan.radiance
     assert not plan.sensor
     assert all(step.why for step in plan.steps)
+
+
+@pytest.mark.parametrize(("pixel_pitch_m", "decision"), [(1.4e-6, "run"), (2e-3, "skip")])
+def test_plan_leaves_diffraction_out_where_samples_are_too_coarse_and_the_run_agrees(
+    recipe: dict[str, Any], tmp_path: Path, pixel_pitch_m: float, decision: str
+) -> None:
+    recipe["cameras"][0]["sensors"][0]["pixel_pitch_m"] = pixel_pitch_m
+    manifest, _ = make(recipe, tmp_path)
+    (step,) = (step for step in manifest["plan"] if step["what"] == "main: diffraction")
+    assert step["decision"] == decision
+    left_out = any("diffraction: left out in 31 of 31 bands" in note for note in manifest["run"]["notes"])
+    assert left_out == (decision == "skip")
