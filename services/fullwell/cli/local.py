@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import sys
 from pathlib import Path
@@ -117,9 +118,11 @@ def _summary(folder: Path, index: int, manifest: dict[str, Any]) -> dict[str, An
 def _stage_store(folder: Path | None) -> StageStore | None:
     """Return the stage cache of commands in `folder` or at its usual place; None where the settings turn it off."""
     from fullwell.core.settings import load_settings
+    from fullwell.jobs.logs import configure_logs
     from fullwell.pipeline import StageStore
     from fullwell.storage import LocalStore
 
+    configure_logs(level=logging.WARNING)  # to standard error: a cache in trouble is told, and reports stay readable
     limit = load_settings().cache_bytes
     return StageStore(LocalStore(folder or _cache_folder()), max_bytes=limit) if limit else None
 
@@ -147,13 +150,24 @@ def _forget_other(store: Any, prefix: str, document: RecipeDocument, index: int)
             store.delete_prefix(f"{prefix}/")
 
 
-def plan(recipe: RecipeArgument, overrides: SetOption = None, frame: int = 0, as_json: JsonOption = False) -> None:
+def plan(
+    recipe: RecipeArgument,
+    overrides: SetOption = None,
+    frame: int = 0,
+    cache: CacheOption = None,
+    no_cache: Annotated[bool, typer.Option("--no-cache", help="Do not look for what is kept already.")] = False,
+    as_json: JsonOption = False,
+) -> None:
     """Say what a frame would need, what is skipped and why; nothing is rendered."""
-    from fullwell.pipeline import plan_document, plan_frame
+    from fullwell.pipeline import plan_document, plan_frame, with_cache_steps
     from fullwell.schema import build_frame
 
     document = _load(recipe, overrides)
-    decided = plan_frame(build_frame(document, frame, base_dir=document.base_dir))
+    described = build_frame(document, frame, base_dir=document.base_dir)
+    decided = plan_frame(described)
+    stages = None if no_cache else _stage_store(cache)
+    if stages is not None:
+        decided = with_cache_steps(decided, described, stages)
     if as_json:
         print(json.dumps({"frame": frame, "plan": plan_document(decided)}, indent=2))
         return

@@ -1,6 +1,6 @@
 """From a recipe to published frames: plan, stages, keys, cache, frame runner."""
 
-from fullwell.pipeline.cache import RadianceCache
+from fullwell.pipeline.cache import RadianceCache, with_cache_steps
 from fullwell.pipeline.frame import MANIFEST_NAME, MANIFEST_SCHEMA, render_frame
 from fullwell.pipeline.plan import FramePlan, PlanStep, plan_document, plan_frame
 from fullwell.pipeline.progress import CancelCheck, FrameProgress, ProgressCallback
@@ -21,4 +21,5 @@ __all__ = [
     "plan_frame",
     "render_frame",
     "run_frame",
+    "with_cache_steps",
 ]

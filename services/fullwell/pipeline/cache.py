@@ -11,7 +11,7 @@ import struct
 import time
 from collections import OrderedDict
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -21,11 +21,22 @@ from numpy.typing import NDArray
 
 import fullwell
 from fullwell.core.hashing import canonical_json, digest_of, sha256_file
+from fullwell.pipeline.keys import radiance_key
+from fullwell.pipeline.plan import FramePlan, PlanStep
 from fullwell.pipeline.stage_store import StageStore
 from fullwell.radiometry import RadianceImage, WavelengthGrid
 from fullwell.render import RenderStatistics, choose_variant
+from fullwell.schema.frame import FrameDescription
 
-__all__ = ["ObtainedRadiance", "RadianceCache", "decode_radiance", "encode_radiance", "obtain_radiance", "stored_radiance_key"]
+__all__ = [
+    "ObtainedRadiance",
+    "RadianceCache",
+    "decode_radiance",
+    "encode_radiance",
+    "obtain_radiance",
+    "stored_radiance_key",
+    "with_cache_steps",
+]
 
 KIND = "radiance"
 _ENTRY_VERSION = 1
@@ -159,6 +170,19 @@ def obtain_radiance(
         rendered = render()
         stages.put(KIND, stored_key, *encode_radiance(*rendered))
         return obtained(rendered, "render")
+
+
+def with_cache_steps(plan: FramePlan, frame: FrameDescription, stages: StageStore) -> FramePlan:
+    """Return the plan with what the stage cache holds of it now. Manifests keep the plan without: it is the same everywhere."""
+    if not plan.radiance:
+        return plan
+    steps = []
+    for rig in frame.cameras:
+        key = stored_radiance_key(radiance_key(frame, rig, variant=choose_variant().variant))
+        kept, address = stages.has(KIND, key), stages.address(KIND, key)
+        why = f"kept as {address}: not rendered again" if kept else f"not kept yet; will be kept as {address}"
+        steps.append(PlanStep(f"{rig.camera.name}: stage cache", "skip" if kept else "run", why))
+    return replace(plan, steps=(*plan.steps, *steps))
 
 
 def _read(stages: StageStore, stored_key: str, shape: tuple[int, int, int]) -> Rendered | None:

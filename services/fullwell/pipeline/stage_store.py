@@ -124,6 +124,13 @@ class StageStore:
             self.store.delete(address)
         return None
 
+    def has(self, kind: str, key: str) -> bool:
+        """Return whether an entry is there; it is not read."""
+        address = self.address(kind, key)
+        with self._tolerating("look for", address):
+            return self._is_near() and self.store.exists(address)
+        return False
+
     def put(self, kind: str, key: str, *parts: bytes | memoryview) -> bool:
         """Keep the concatenated parts; return whether they are kept now. The first of several writers wins."""
         address = self.address(kind, key)
