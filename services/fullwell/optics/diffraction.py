@@ -80,6 +80,11 @@ def ringing_slack(*, wavelength_nm: float, f_number: float, pitch_m: float) -> f
     return 1.0 / coarse if coarse > 0 else math.inf
 
 
+def _root_mean_square(band: NDArray[np.float64]) -> float:
+    """Return the root mean square, by a sum whose order does not depend on threads as a BLAS product's does."""
+    return math.sqrt(float(np.einsum("ij,ij->", band, band)) / band.size)
+
+
 class DiffractionFilter:
     """Diffraction for images of one shape and pitch; what does not depend on the wavelength is kept between bands.
 
@@ -116,7 +121,7 @@ class DiffractionFilter:
         slack = ringing_slack(wavelength_nm=wavelength_nm, f_number=f_number, pitch_m=self._pitch_m)
         if math.isinf(slack):
             return without_negative_light(self._filtered(spectrum, self._radius, cutoff), total=total)
-        smooth = self._smooth(spectrum, cutoff, rms=math.sqrt(float(np.vdot(band, band)) / band.size))
+        smooth = self._smooth(spectrum, cutoff, rms=_root_mean_square(band))
         exact = self._filtered(spectrum, self._radius, cutoff)
         return without_ringing(exact, smooth, bound=slack * self._bounds(), total=total)
 
