@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import gc
-from dataclasses import dataclass
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,7 @@ from fullwell.radiometry.spectrum import Spectrum
 from fullwell.scene import (
     Conductor,
     ConstantEnvironment,
+    Cube,
     Cylinder,
     Dielectric,
     Diffuse,
@@ -27,6 +30,7 @@ from fullwell.scene import (
     Part,
     PointLight,
     Principled,
+    Rectangle,
     RoughPlastic,
     SceneDescription,
     Sphere,
@@ -35,6 +39,7 @@ from fullwell.scene import (
     Texture,
 )
 from fullwell.scene.tessellate import is_similarity, mesh_of, transform_mesh
+from fullwell.scene.validate import check_scene
 
 __all__ = ["TranslatedScene", "translate"]
 
@@ -42,6 +47,9 @@ _TABLE_LOW_NM = 300.0
 _TABLE_HIGH_NM = 1100.0
 """Tables that hold their end values are written out over this range, which contains every wavelength a grid may ask for;
 the renderer's own spectra are 0 outside their tables."""
+
+_BLACK = 1e-35
+"""Spectra below this are black: single precision would make the renderer's tables zero, which it refuses."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,8 +72,14 @@ _kept: list[tuple[SceneDescription, TranslatedScene]] = []
 def translate(mi: Any, scene: SceneDescription, centre_m: NDArray[np.float64]) -> TranslatedScene:
     """Load `scene` into the active Mitsuba variant with its origin moved to `centre_m` [m].
 
-    The scene that was loaded last is kept and returned again for the same object and centre. Raises RenderError with the
-    renderer's own words where it refuses the scene.
+    The scene that was loaded last is kept and returned again for the same object and centre.
+
+    Raises
+    ------
+    FieldError
+        The scene holds what no renderer can show as it is meant.
+    RenderError
+        The renderer refused the scene, in its own words.
     """
     for kept_scene, translated in _kept:
         if kept_scene is scene and np.array_equal(translated.centre_m, centre_m):
@@ -79,6 +93,8 @@ def translate(mi: Any, scene: SceneDescription, centre_m: NDArray[np.float64]) -
 
 
 def _load(mi: Any, scene: SceneDescription, centre_m: NDArray[np.float64]) -> TranslatedScene:
+    check_scene(scene)
+    _check_reach(scene, centre_m)
     recentre = np.eye(4)
     recentre[:3, 3] = -np.asarray(centre_m, dtype=np.float64)
     contents: dict[str, Any] = {"type": "scene"}
@@ -89,10 +105,12 @@ def _load(mi: Any, scene: SceneDescription, centre_m: NDArray[np.float64]) -> Tr
             for number, part in enumerate(scene_object.parts):
                 shape_id = f"o{index}_{number}"
                 to_world = recentre @ scene_object.to_world @ part.to_object
-                contents[shape_id] = _shape(mi, materials, shape_id, part, to_world)
+                with _naming(scene_object.id, index, number):
+                    contents[shape_id] = _shape(mi, materials, shape_id, part, to_world)
                 object_of_shape[shape_id] = index
         for number, light in enumerate(scene.lights):
-            contents[f"l{number}"] = _emitter(mi, light, recentre)
+            if not _is_black(light):
+                contents[f"l{number}"] = _emitter(mi, light, recentre)
         loaded = mi.load_dict(contents, optimize=False)
     except FullwellError:
         raise
@@ -102,13 +120,68 @@ def _load(mi: Any, scene: SceneDescription, centre_m: NDArray[np.float64]) -> Tr
     return TranslatedScene(loaded, object_of_shape, np.asarray(centre_m, dtype=np.float64))
 
 
+@contextmanager
+def _naming(object_id: str, index: int, number: int) -> Iterator[None]:
+    """Put the object's id and the part before a refusal of one shape."""
+    try:
+        yield
+    except FieldError as error:
+        path = f"scene.objects[{index}].parts[{number}].{error.path}".rstrip(".")
+        raise FieldError(f"object {object_id!r}, part {number}: {error.message}", path, error.value) from error
+
+
+# Sizes ---------------------------------------------------------------------------------------------------------------
+
+_FARTHEST_CENTRE_M = 1e8
+_SMALLEST_REACH_M = 5e-3
+"""The renderer starts rays 9e-5 m (1 + largest coordinate) off a surface, so that rounding does not make it shadow itself."""
+
+_EMITTER_AREA_TOLERANCE = 0.05
+"""Relative change of a lamp's area, and so of its power, by the rounding of its vertices to single precision."""
+
+
+def _check_reach(scene: SceneDescription, centre_m: NDArray[np.float64]) -> None:
+    """Refuse a camera that is nowhere, and a scene so small that rays skip over its shapes."""
+    if not np.all(np.abs(centre_m) <= _FARTHEST_CENTRE_M):
+        raise FieldError(
+            f"the camera stands at {np.asarray(centre_m).tolist()}; must be finite and within {_FARTHEST_CENTRE_M:g} m of the "
+            "origin.",
+            path="camera_to_world",
+        )
+    if not scene.objects:
+        return
+    reach_m = max(_reach_m(part, item.to_world @ part.to_object, centre_m) for item in scene.objects for part in item.parts)
+    if reach_m < _SMALLEST_REACH_M:
+        raise FieldError(
+            f"the scene lies within {reach_m:.2g} m of the camera; must reach >= {_SMALLEST_REACH_M:g} m. Scale the scene, "
+            "the camera's pupil and the distances of lights up together: radiance does not change.",
+            path="scene.objects",
+        )
+
+
+def _reach_m(part: Part, to_world: NDArray[np.float64], centre_m: NDArray[np.float64]) -> float:
+    """Return a coordinate [m] from the camera that no point of the part exceeds, at most three times too large."""
+    match part.geometry:
+        case Mesh(vertices_m=vertices):
+            corners = np.array([vertices.min(axis=0), vertices.max(axis=0)])
+        case Sphere(radius_m=radius) | Disk(radius_m=radius):
+            corners = np.array([[-radius] * 3, [radius] * 3])
+        case Cylinder(radius_m=radius, height_m=height):
+            corners = np.array([[-radius, -radius, -height / 2], [radius, radius, height / 2]])
+        case Rectangle(size_m=size) | Cube(size_m=size):
+            half = np.resize(np.append(size, 0.0), 3) / 2
+            corners = np.array([-half, half])
+    middle = to_world[:3, :3] @ corners.mean(axis=0) + to_world[:3, 3] - centre_m
+    return float((np.abs(middle) + np.abs(to_world[:3, :3]) @ (corners[1] - corners[0]) / 2).max())
+
+
 # Spectra -------------------------------------------------------------------------------------------------------------
 
 
 def _spectrum(spectrum: Spectrum) -> dict[str, Any]:
     """Write a table out as the renderer's `regular` (equal steps) or `irregular` spectrum, nothing resampled."""
     wavelength_nm, values = spectrum.wavelength_nm, spectrum.values
-    if not np.any(values):  # the renderer's tables refuse a legal black
+    if not np.any(values > _BLACK):  # the renderer's tables refuse a legal black
         return {"type": "uniform", "value": 0.0}
     if spectrum.outside == "hold":
         low, high = _TABLE_LOW_NM, _TABLE_HIGH_NM
@@ -118,11 +191,31 @@ def _spectrum(spectrum: Spectrum) -> dict[str, Any]:
             wavelength_nm, values = np.append(wavelength_nm, high), np.append(values, values[-1])
     if wavelength_nm.size == 1:  # a line of no width has no energy, but the renderer wants two points
         wavelength_nm, values = np.append(wavelength_nm, wavelength_nm[0] + 1.0), np.zeros(2)
+    wavelength_nm, values = _single_precision_table(wavelength_nm, values)
     return {
         "type": "irregular",
         "wavelengths": ", ".join(repr(float(w)) for w in wavelength_nm),
         "values": ", ".join(repr(float(v)) for v in values),
     }
+
+
+def _single_precision_table(
+    wavelength_nm: NDArray[np.float64], values: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the table with wavelengths that still increase in single precision, which rounds them to 6e-5 nm.
+
+    Of knots that become one, the first and the last stay, neighbours: a step stays a step.
+    """
+    rounded = wavelength_nm.astype(np.float32)
+    if np.all(np.diff(rounded) > 0):
+        return rounded.astype(np.float64), values
+    knots, first, count = np.unique(rounded, return_index=True, return_counts=True)
+    following = np.append(knots[1:], np.float32(np.inf))
+    step = (count > 1) & (np.nextafter(knots, following) < following)
+    positions = np.concatenate([knots, np.nextafter(knots, following)[step]])
+    heights = np.concatenate([values[first], values[first + count - 1][step]])
+    order = np.argsort(positions, kind="stable")
+    return positions[order].astype(np.float64), heights[order]
 
 
 def _colour(mi: Any, colour: Spectrum | Texture) -> dict[str, Any]:
@@ -163,7 +256,7 @@ def _bsdf(mi: Any, material: Material) -> dict[str, Any]:
                 {
                     "type": "roughplastic",
                     "diffuse_reflectance": _colour(mi, material.reflectance),
-                    "alpha": float(material.roughness),
+                    "alpha": max(_MIN_ALPHA, float(material.roughness)),
                     "int_ior": float(material.interior_index),
                     "distribution": "ggx",
                     "nonlinear": True,
@@ -173,7 +266,7 @@ def _bsdf(mi: Any, material: Material) -> dict[str, Any]:
             return _two_sided(_principled(mi, material))
         case Conductor():
             bsdf: dict[str, Any] = {"type": "conductor", "eta": _spectrum(material.eta), "k": _spectrum(material.k)}
-            if material.roughness > 0:
+            if material.roughness >= _MIN_ALPHA:
                 bsdf |= {"type": "roughconductor", "alpha": float(material.roughness), "distribution": "ggx"}
             return _two_sided(bsdf)
         case Mirror():
@@ -186,7 +279,8 @@ def _bsdf(mi: Any, material: Material) -> dict[str, Any]:
                 "int_ior": material.interior_index,
                 "ext_ior": material.exterior_index,
             }
-            if material.roughness > 0:
+            # Without a step of the index there is nothing to scatter at, and the renderer's rough model refuses it.
+            if material.roughness >= _MIN_ALPHA and material.interior_index != material.exterior_index:
                 glass |= {"type": "roughdielectric", "alpha": float(material.roughness), "distribution": "ggx"}
             return glass
 
@@ -232,11 +326,14 @@ def _principled(mi: Any, material: Principled) -> dict[str, Any]:
 def _shape(mi: Any, materials: _Materials, shape_id: str, part: Part, to_world: NDArray[np.float64]) -> Any:
     bsdf = materials.get(part.material)
     emission = None
-    if part.emission is not None and np.any(part.emission.radiance.values):
+    if part.emission is not None and np.any(part.emission.radiance.values > _BLACK):
         emission = {"type": "area", "radiance": _spectrum(part.emission.radiance)}
     native = _native_shape(mi, part, to_world)
     if native is None:
-        mesh = transform_mesh(to_world, mesh_of(part.geometry))
+        mesh = _with_whole_normals(transform_mesh(to_world, mesh_of(part.geometry)))
+        if emission is not None:
+            mesh = _without_repeated_faces(mesh)
+            _check_emitter_area(mesh)
         return _mesh_shape(mi, shape_id, mesh, bsdf, emission)
     native["bsdf"] = bsdf
     if emission is not None:
@@ -267,6 +364,47 @@ def _native_shape(mi: Any, part: Part, to_world: NDArray[np.float64]) -> dict[st
             return None
 
 
+def _with_whole_normals(mesh: Mesh) -> Mesh:
+    """Return the mesh with the mean normal of its triangles where a vertex has a zero normal, which would be black."""
+    if mesh.normals is None:
+        return mesh
+    zero = ~np.any(mesh.normals, axis=1)
+    if not zero.any():
+        return mesh
+    corners = mesh.vertices_m[mesh.faces]
+    crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sums = np.zeros(mesh.normals.shape)
+    np.add.at(sums, mesh.faces, crossed[:, None, :])
+    length = np.linalg.norm(sums, axis=1, keepdims=True)
+    mean = np.divide(sums, length, out=np.zeros_like(sums), where=length > 0)
+    return replace(mesh, normals=np.where(zero[:, None], mean, mesh.normals))
+
+
+def _without_repeated_faces(mesh: Mesh) -> Mesh:
+    """Return the mesh with each triangle once: a lamp would shine from each copy."""
+    _, corner = np.unique(mesh.vertices_m, axis=0, return_inverse=True)
+    named = np.sort(corner.reshape(-1)[mesh.faces], axis=1)
+    _, first = np.unique(named, axis=0, return_index=True)
+    return mesh if len(first) == len(mesh.faces) else replace(mesh, faces=mesh.faces[np.sort(first)])
+
+
+def _check_emitter_area(mesh: Mesh) -> None:
+    """Refuse a lamp whose power would be wrong because its vertices are too far away for single precision."""
+    areas = [_area_m2(mesh, kind) for kind in (np.float64, np.float32)]
+    if not abs(areas[1] - areas[0]) <= _EMITTER_AREA_TOLERANCE * areas[0]:
+        raise FieldError(
+            f"its area of {areas[0]:.3g} m2 becomes {areas[1]:.3g} m2 in single precision at its distance from the camera; "
+            f"must keep to {_EMITTER_AREA_TOLERANCE:.0%}. Make it a point light, or a sphere or disk, which stay exact.",
+            path="geometry",
+        )
+
+
+def _area_m2(mesh: Mesh, rounded_to: type[np.float32 | np.float64]) -> float:
+    corners = mesh.vertices_m.astype(rounded_to).astype(np.float64)[mesh.faces]
+    crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return float(np.linalg.norm(crossed, axis=1).sum() / 2)
+
+
 def _transform(mi: Any, matrix: NDArray[np.float64]) -> Any:
     return mi.ScalarTransform4f(matrix)
 
@@ -289,6 +427,15 @@ def _mesh_shape(mi: Any, shape_id: str, mesh: Mesh, bsdf: Any, emission: dict[st
 
 
 # Lights --------------------------------------------------------------------------------------------------------------
+
+
+_LOWEST_SUN_SINE = 1e-5
+"""The renderer's sky is black for a sun exactly on the horizon; here it is 2 arc seconds above."""
+
+
+def _is_black(light: Light) -> bool:
+    """Return whether the light is an image without light, which the renderer cannot sample."""
+    return isinstance(light, ImageEnvironment) and not np.any(light.pixels * np.max(light.radiance.values) > _BLACK)
 
 
 def _emitter(mi: Any, light: Light, recentre: NDArray[np.float64]) -> dict[str, Any]:
@@ -316,9 +463,10 @@ def _emitter(mi: Any, light: Light, recentre: NDArray[np.float64]) -> dict[str, 
         case ImageEnvironment():
             return _image_environment(mi, light)
         case SunSky():
+            x, y, z = np.asarray(light.sun_direction, dtype=np.float64) / np.linalg.norm(light.sun_direction)
             return {
                 "type": "sunsky",
-                "sun_direction": [float(x) for x in light.sun_direction],
+                "sun_direction": [float(x), float(y), max(_LOWEST_SUN_SINE, float(z))],
                 "turbidity": float(light.turbidity),
                 "albedo": float(light.ground_albedo),
                 "sun_scale": float(light.sun_weight),

@@ -1,0 +1,392 @@
+"""Scenes and cameras checked before a renderer sees them: what is wrong, where, what is legal and what to do next.
+
+Renderers drop what they cannot use without a word (NaN vertices, singular transforms), count it twice (repeated triangles of a
+lamp) or die of it (an environment image without pixels). The checks here hold for any scene, whoever made it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fullwell.core.errors import FieldError
+from fullwell.radiometry.spectrum import Spectrum
+from fullwell.scene.camera import Camera
+from fullwell.scene.description import (
+    Conductor,
+    ConstantEnvironment,
+    Cube,
+    Cylinder,
+    Dielectric,
+    Diffuse,
+    DirectionalLight,
+    Disk,
+    Geometry,
+    ImageEnvironment,
+    Light,
+    Material,
+    Mesh,
+    Mirror,
+    Part,
+    PointLight,
+    Principled,
+    Rectangle,
+    RoughPlastic,
+    SceneDescription,
+    Sphere,
+    SpotLight,
+    SunSky,
+    Texture,
+)
+
+__all__ = ["check_camera", "check_scene"]
+
+_FARTHEST_M = 1e8
+"""Coordinates beyond this are a slip of units; squares of distances stay far within single precision."""
+
+_LARGEST_RADIANCE = 1e15
+"""In W m^-2 sr^-1 nm^-1 (W sr^-1 nm^-1 of points): 10^10 times the sun's, and its photons still fit single precision."""
+
+_LINE_TOLERANCE = 1e-3
+"""What the product promises on analytic scenes."""
+
+_ROUNDING = 1e-6
+"""By how much a share may leave [0, 1]: single precision cannot tell."""
+
+_SMALLEST_STRETCH = 1e-9
+_MOST_UNEQUAL_STRETCH = 1e-7
+"""Ratio of the smallest to the largest stretch below which single precision sees a plane."""
+
+_DEGENERATE_RELATIVE_AREA = 1e-12
+_FACES_AT_ONCE = 1 << 16
+
+_INDEX_RANGE = (0.1, 10.0)
+
+_NARROWEST_CONE_DEG = 0.2
+"""The cosine of a smaller angle is 1 to single precision within a few per cent of the angle."""
+
+_FINEST_PIXEL = 1e-6
+"""Tangent of the angle of a film sample. Vertices are rounded to 6e-8 of their distance: a sixteenth of this."""
+
+_MOST_SAMPLES = 100_000_000
+_RIGID_TOLERANCE = 1e-6
+
+
+def check_scene(scene: SceneDescription) -> None:
+    """Raise FieldError at the first thing in `scene` that no renderer can show as it is meant.
+
+    Checked are shapes, transforms, materials, spectra and lights, with the object's id, the part and the field in the
+    message. Each mesh and each material is looked at once, however many objects share it.
+    """
+    seen: set[int] = set()
+    for index, item in enumerate(scene.objects):
+        where = _Place(f"scene.objects[{index}]", f"object {item.id!r}")
+        if not item.parts:
+            where.fail("parts", "is empty; an object needs at least one part. Leave the object out instead.")
+        to_world = _affine(item.to_world, where, "to_world")
+        for number, part in enumerate(item.parts):
+            named = f" ({part.name!r})" if part.name else ""
+            _part(part, to_world, _Place(f"{where.path}.parts[{number}]", f"{where.name}, part {number}{named}"), seen)
+    for index, light in enumerate(scene.lights):
+        _light(light, _Place(f"scene.lights[{index}]", f"light {index} ({type(light).__name__})"))
+
+
+def check_camera(camera: Camera) -> None:
+    """Raise FieldError where `camera` cannot make rays: its pose, lens or film is not one.
+
+    Film samples finer than single precision can tell apart are refused too: vertices are rounded to 6e-8 of their distance.
+    """
+    where = _Place(f"cameras.{camera.name}", f"camera {camera.name!r}")
+    pose = _affine(camera.camera_to_world, where, "camera_to_world")
+    rotation = pose[:3, :3]
+    if np.abs(rotation.T @ rotation - np.eye(3)).max() > _RIGID_TOLERANCE or np.linalg.det(rotation) < 0:
+        where.fail("camera_to_world", "is not a rotation and a translation; make it with look_at.")
+    lens, film = camera.lens, camera.film
+    for name, value in (("focal_length_m", lens.focal_length_m), ("f_number", lens.f_number)):
+        _positive(value, where, f"lens.{name}")
+    if not lens.focus_distance_m > lens.focal_length_m:
+        where.fail("lens.focus_distance_m", f"is {lens.focus_distance_m}; must be > focal_length_m = {lens.focal_length_m}.")
+    for name, count in (("rows", film.rows), ("cols", film.cols)):
+        if int(count) != count or count < 1:
+            where.fail(f"film.{name}", f"is {count}; must be a whole number >= 1.")
+    _positive(film.pitch_m, where, "film.pitch_m")
+    if film.rows * film.cols > _MOST_SAMPLES:
+        where.fail("film", f"has {film.rows} x {film.cols} samples; must be <= {_MOST_SAMPLES} together. Render it in pieces.")
+    if camera.tangent_pitch < _FINEST_PIXEL:
+        where.fail(
+            "film.pitch_m",
+            f"makes film samples of {camera.tangent_pitch:.2g} rad; must be >= {_FINEST_PIXEL:g} rad, below which single "
+            "precision moves edges by visible parts of a sample. Shorten the lens or move the camera nearer.",
+        )
+
+
+class _Place:
+    """Where in the scene a check is: the path of the field and the name a person knows."""
+
+    def __init__(self, path: str, name: str) -> None:
+        self.path = path
+        self.name = name
+
+    def fail(self, field: str, sentence: str, value: Any = None) -> NoReturn:
+        """Raise the FieldError "<name>: <field> <sentence>"."""
+        raise FieldError(f"{self.name}: {field} {sentence}", f"{self.path}.{field}", value)
+
+
+def _positive(value: float, where: _Place, field: str) -> None:
+    if not 0 < value < math.inf:
+        where.fail(field, f"is {value}; must be > 0 and finite.", float(value))
+
+
+def _between(value: float, low: float, high: float, where: _Place, field: str) -> None:
+    if not low <= value <= high:
+        where.fail(field, f"is {value}; must be in [{low:g}, {high:g}].", float(value))
+
+
+# Transforms and shapes -----------------------------------------------------------------------------------------------
+
+
+def _affine(matrix: ArrayLike, where: _Place, field: str) -> NDArray[np.float64]:
+    given = np.asarray(matrix, dtype=np.float64)
+    if given.shape != (4, 4):
+        where.fail(field, f"has shape {given.shape}; must be (4, 4).")
+    if not np.all(np.isfinite(given)):
+        where.fail(field, "holds NaN or Inf; every element must be finite.")
+    if np.abs(given[3] - [0, 0, 0, 1]).max() > _RIGID_TOLERANCE:
+        where.fail(field, f"has the last row {given[3].tolist()}; must be [0, 0, 0, 1].")
+    if np.abs(given[:3, 3]).max() > _FARTHEST_M:
+        where.fail(field, f"moves by {np.abs(given[:3, 3]).max():g} m; must be <= {_FARTHEST_M:g} m. Check the unit.")
+    return given
+
+
+def _part(part: Part, to_world: NDArray[np.float64], where: _Place, seen: set[int]) -> None:
+    placed = to_world @ _affine(part.to_object, where, "to_object")
+    stretches = np.linalg.svd(placed[:3, :3], compute_uv=False)
+    if stretches[-1] < _SMALLEST_STRETCH or stretches[-1] < _MOST_UNEQUAL_STRETCH * stretches[0]:
+        where.fail(
+            "to_object",
+            f"and the object's to_world are together singular or nearly so: they stretch by {stretches[0]:.3g} one way and "
+            f"{stretches[-1]:.3g} another; the ratio must be >= {_MOST_UNEQUAL_STRETCH:g}. Make the shape itself thin instead.",
+        )
+    if id(part.geometry) not in seen:
+        _geometry(part.geometry, where)
+        seen.add(id(part.geometry))
+    reach = np.abs(placed[:3, :3]) @ _half_extent(part.geometry) + np.abs(placed[:3, 3])
+    if reach.max() > _FARTHEST_M:
+        where.fail("geometry", f"reaches {reach.max():.3g} m from the origin; must be <= {_FARTHEST_M:g} m. Check the unit.")
+    if id(part.material) not in seen:
+        _material(part.material, where)
+        seen.add(id(part.material))
+    if part.emission is not None:
+        _power(part.emission.radiance, where, "emission.radiance")
+        if isinstance(part.geometry, Mesh):
+            _one_sided(part.geometry, where)
+
+
+def _half_extent(geometry: Geometry) -> NDArray[np.float64]:
+    """Return the largest |x|, |y|, |z| of the shape in its own coordinates [m]."""
+    match geometry:
+        case Sphere(radius_m=radius):
+            return np.full(3, radius)
+        case Rectangle(size_m=(width, height)):
+            return np.array([width / 2, height / 2, 0.0])
+        case Disk(radius_m=radius):
+            return np.array([radius, radius, 0.0])
+        case Cube(size_m=size):
+            return np.asarray(size, dtype=np.float64) / 2
+        case Cylinder(radius_m=radius, height_m=height):
+            return np.array([radius, radius, height / 2])
+        case Mesh(vertices_m=vertices):
+            return np.asarray(np.maximum(np.abs(vertices.min(axis=0)), np.abs(vertices.max(axis=0))))
+
+
+def _geometry(geometry: Geometry, where: _Place) -> None:
+    match geometry:
+        case Sphere(radius_m=radius) | Disk(radius_m=radius):
+            _positive(radius, where, "geometry.radius_m")
+        case Rectangle(size_m=size) | Cube(size_m=size):
+            for edge in size:
+                _positive(edge, where, "geometry.size_m")
+        case Cylinder(radius_m=radius, height_m=height):
+            _positive(radius, where, "geometry.radius_m")
+            _positive(height, where, "geometry.height_m")
+        case Mesh():
+            _mesh(geometry, where)
+
+
+def _mesh(mesh: Mesh, where: _Place) -> None:
+    vertices, faces = mesh.vertices_m, mesh.faces
+    _rows_of(vertices, 3, where, "geometry.vertices_m")
+    if faces.ndim != 2 or faces.shape[1] != 3 or not np.issubdtype(faces.dtype, np.integer):
+        where.fail("geometry.faces", f"has shape {faces.shape} of {faces.dtype}; must be (n, 3) whole numbers.")
+    if len(faces) == 0:
+        where.fail("geometry.faces", "is empty; a mesh needs at least one triangle. Leave the part out instead.")
+    low, high = int(faces.min()), int(faces.max())
+    if low < 0 or high >= len(vertices):
+        wrong = low if low < 0 else high
+        where.fail("geometry.faces", f"names vertex {wrong}; must be in [0, {len(vertices) - 1}].", wrong)
+    for name, per_vertex, width in (("normals", mesh.normals, 3), ("uv", mesh.uv, 2)):
+        if per_vertex is not None:
+            _rows_of(per_vertex, width, where, f"geometry.{name}")
+            if len(per_vertex) != len(vertices):
+                where.fail(f"geometry.{name}", f"has {len(per_vertex)} rows; must be one per vertex, {len(vertices)}.")
+    # A few triangles without area are common in files and do no harm; the first slice nearly always has one with area.
+    starts = range(0, len(faces), _FACES_AT_ONCE)
+    if not any(np.any(_have_area(vertices, faces[start : start + _FACES_AT_ONCE])) for start in starts):
+        where.fail("geometry.faces", "has no triangle with an area: corners coincide or lie on one line. Move the vertices.")
+
+
+def _rows_of(array: NDArray[Any], width: int, where: _Place, field: str) -> None:
+    if array.ndim != 2 or array.shape[1] != width:
+        where.fail(field, f"has shape {array.shape}; must be (n, {width}).")
+    finite = np.isfinite(array)
+    if not finite.all():
+        row = int(np.flatnonzero(~finite.all(axis=1))[0])
+        where.fail(field, f"[{row}] is {array[row].tolist()}; every number must be finite. Repair the mesh.")
+
+
+def _have_area(vertices: NDArray[np.float64], faces: NDArray[Any]) -> NDArray[np.bool_]:
+    corners = np.asarray(vertices, dtype=np.float64)[faces]
+    edges = corners[:, [1, 2, 0]] - corners
+    doubled = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    return np.asarray(doubled > _DEGENERATE_RELATIVE_AREA * (edges**2).sum(axis=2).max(axis=1))
+
+
+def _one_sided(mesh: Mesh, where: _Place) -> None:
+    """Refuse a lamp with two coincident triangles that face opposite ways: which of them a ray meets is chance."""
+    _, corner = np.unique(mesh.vertices_m, axis=0, return_inverse=True)
+    named = corner.reshape(-1)[mesh.faces]
+    count = len(named)
+    _, group = np.unique(np.concatenate([_smallest_first(named), _smallest_first(named[:, ::-1])]), axis=0, return_inverse=True)
+    group = group.reshape(-1)
+    whole = (named[:, 0] != named[:, 1]) & (named[:, 1] != named[:, 2]) & (named[:, 2] != named[:, 0])
+    facing_away = np.flatnonzero(whole & np.isin(group[:count], group[count:]))
+    if facing_away.size:
+        where.fail(
+            f"geometry.faces[{int(facing_away[0])}]",
+            "of a lamp coincides with a triangle that faces the other way; only one can be seen. Move them apart.",
+        )
+
+
+def _smallest_first(faces: NDArray[Any]) -> NDArray[Any]:
+    """Turn each triangle, without mirroring it, so that its smallest number stands first."""
+    order = (faces.argmin(axis=1)[:, None] + np.arange(3)) % 3
+    return np.asarray(np.take_along_axis(faces, order, axis=1))
+
+
+# Materials and spectra -----------------------------------------------------------------------------------------------
+
+
+def _material(material: Material, where: _Place) -> None:
+    match material:
+        case Diffuse() | Mirror():
+            _reflectance(material.reflectance, where, "material.reflectance")
+        case RoughPlastic():
+            _reflectance(material.reflectance, where, "material.reflectance")
+            _between(material.roughness, 0, 1, where, "material.roughness")
+            _between(material.interior_index, 1, _INDEX_RANGE[1], where, "material.interior_index")
+        case Principled():
+            _reflectance(material.base_color, where, "material.base_color")
+            for name in ("roughness", "metallic", "specular"):
+                _between(getattr(material, name), 0, 1, where, f"material.{name}")
+        case Conductor():
+            for name, table in (("eta", material.eta), ("k", material.k)):
+                _between(float(table.values.min()), 0, math.inf, where, f"material.{name}")
+            _between(material.roughness, 0, 1, where, "material.roughness")
+        case Dielectric():
+            _between(material.interior_index, *_INDEX_RANGE, where, "material.interior_index")
+            _between(material.exterior_index, *_INDEX_RANGE, where, "material.exterior_index")
+            _between(material.roughness, 0, 1, where, "material.roughness")
+
+
+def _reflectance(colour: Spectrum | Texture, where: _Place, field: str) -> None:
+    if isinstance(colour, Texture):
+        shape, dtype = colour.pixels.shape, colour.pixels.dtype
+        if len(shape) != 3 or shape[2] != 3 or 0 in shape or dtype != np.uint8:
+            where.fail(field, f"is a texture of shape {shape} and type {dtype}; must be (rows, cols, 3) uint8, not empty.")
+        return
+    low, high = float(colour.values.min()), float(colour.values.max())
+    if low < 0 or high > 1 + _ROUNDING:
+        wrong = low if low < 0 else high
+        where.fail(field, f"is {wrong:g} at some wavelength; must be in [0, 1]. Light would be made from nothing.", wrong)
+
+
+def _power(spectrum: Spectrum, where: _Place, field: str) -> None:
+    low, high = float(spectrum.values.min()), float(spectrum.values.max())
+    if low < 0 or high > _LARGEST_RADIANCE:
+        wrong = low if low < 0 else high
+        where.fail(field, f"is {wrong:g} at some wavelength; must be in [0, {_LARGEST_RADIANCE:g}]. Check its unit.", wrong)
+    energy = float(np.trapezoid(spectrum.values, spectrum.wavelength_nm))
+    rounded = spectrum.wavelength_nm.astype(np.float32).astype(np.float64)
+    if abs(float(np.trapezoid(spectrum.values, rounded)) - energy) > _LINE_TOLERANCE * energy:
+        where.fail(
+            field,
+            "has a line too narrow for single precision, which rounds wavelengths to 6e-5 nm and would change its energy by "
+            f"more than {_LINE_TOLERANCE:g}. Make it at least 0.1 nm wide, of the same area.",
+        )
+
+
+# Lights --------------------------------------------------------------------------------------------------------------
+
+
+def _light(light: Light, where: _Place) -> None:
+    match light:
+        case PointLight():
+            _position(light.position_m, where)
+            _power(light.intensity, where, "intensity")
+        case SpotLight():
+            _position(light.position_m, where)
+            _direction(light.direction, where, "direction")
+            _power(light.intensity, where, "intensity")
+            if not 0 < light.beam_deg < light.cutoff_deg < 90 or light.cutoff_deg < _NARROWEST_CONE_DEG:
+                where.fail(
+                    "cutoff_deg",
+                    f"is {light.cutoff_deg} and beam_deg {light.beam_deg}; must be 0 < beam_deg < cutoff_deg < 90 and "
+                    f"cutoff_deg >= {_NARROWEST_CONE_DEG}. Use a directional light for narrower beams.",
+                )
+        case DirectionalLight():
+            _direction(light.direction, where, "direction")
+            _power(light.irradiance, where, "irradiance")
+        case ConstantEnvironment():
+            _power(light.radiance, where, "radiance")
+        case ImageEnvironment():
+            _environment_image(light, where)
+        case SunSky():
+            _sun(light, where)
+
+
+def _position(position_m: ArrayLike, where: _Place) -> None:
+    given = np.asarray(position_m, dtype=np.float64)
+    if given.shape != (3,) or not np.all(np.abs(given) <= _FARTHEST_M):
+        where.fail("position_m", f"is {given.tolist()}; must be three numbers within {_FARTHEST_M:g} m of the origin.")
+
+
+def _direction(direction: ArrayLike, where: _Place, field: str) -> NDArray[np.float64]:
+    given = np.asarray(direction, dtype=np.float64)
+    if given.shape != (3,) or not np.all(np.isfinite(given)) or not 1e-100 < np.linalg.norm(given) < math.inf:
+        where.fail(field, f"is {given.tolist()}; must be three finite numbers, not all zero.")
+    return given
+
+
+def _environment_image(light: ImageEnvironment, where: _Place) -> None:
+    pixels = light.pixels
+    if pixels.ndim != 3 or pixels.shape[2] != 3 or 0 in pixels.shape:
+        where.fail("pixels", f"has shape {pixels.shape}; must be (rows, cols, 3), not empty.")
+    if not np.all(np.isfinite(pixels)) or pixels.min() < 0:
+        where.fail("pixels", "holds NaN, Inf or negative values; each must be >= 0 and finite. Repair the image.")
+    if not math.isfinite(light.azimuth_deg):
+        where.fail("azimuth_deg", f"is {light.azimuth_deg}; must be finite.")
+    brightest = float(pixels.max())
+    _power(light.radiance.scaled(max(1.0, brightest)), where, "radiance (times the brightest pixel)")
+
+
+def _sun(light: SunSky, where: _Place) -> None:
+    direction = _direction(light.sun_direction, where, "sun_direction")
+    if direction[2] < 0:
+        where.fail("sun_direction", f"is {direction.tolist()}; its z must be >= 0. The model ends where the sun sets.")
+    _between(light.turbidity, 1, 10, where, "turbidity")
+    _between(light.ground_albedo, 0, 1, where, "ground_albedo")
+    for name in ("sun_weight", "sky_weight"):
+        _between(getattr(light, name), 0, _LARGEST_RADIANCE, where, name)
