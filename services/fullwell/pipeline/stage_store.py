@@ -6,7 +6,8 @@ Objects, all below ``cache/``::
     cache/<kind>/<key[:2]>/<key>.used    empty; its time of modification says when the entry was used (to the hour)
     cache/<kind>/<key[:2]>/<key>.lease   a worker is making this entry; its content changes while that worker lives
 
-A crash leaves a lease behind, which others take for dead after `LEASE_S`, and nothing else: entries appear whole or not at all.
+A crash leaves a lease behind, and nothing else: entries appear whole or not at all. Others on the same machine see that its
+process is gone; those on other machines take it for dead after `LEASE_S`.
 """
 
 from __future__ import annotations
@@ -24,12 +25,13 @@ from datetime import UTC, datetime
 import structlog
 
 from fullwell.core.errors import ConflictError, FieldError, NotFoundError
+from fullwell.jobs.processes import current_process, is_gone, process_from_text
 from fullwell.storage import ObjectStore
 
 __all__ = ["LEASE_S", "StageStore", "Turn"]
 
 PREFIX = "cache"
-LEASE_S = 30.0
+LEASE_S = 15.0
 """A lease that has not changed for this long, by the clock of the one who waits, belongs to a dead worker."""
 WAIT_S = 600.0
 """Nobody waits for another worker's entry longer than this."""
@@ -223,7 +225,7 @@ class StageStore:
                 return False
             if content != seen:
                 seen, seen_at = content, now
-            elif now - seen_at > self._lease_s:
+            if now - seen_at > self._lease_s or _is_orphan(content):
                 log.warning("lease of a dead worker", object=lease.name)
                 lease.remove(content)
                 if lease.take():
@@ -278,6 +280,7 @@ class _Lease:
         self.name = name
         self._owner = owner
         self._holder = secrets.token_hex(8)
+        self._process = current_process().to_text()
         self._beats = 0
         self._ended = threading.Event()
         self._thread: threading.Thread | None = None
@@ -329,7 +332,13 @@ class _Lease:
                 self._owner.store.put(self.name, self._content())
 
     def _content(self) -> bytes:
-        return f"{self._holder} {self._beats}".encode()
+        return f"{self._holder} {self._beats} {self._process}".encode()
+
+
+def _is_orphan(content: bytes) -> bool:
+    """Tell whether a lease's holder was a process of this machine that has ended; False where that is not certain."""
+    process = process_from_text(content.decode(errors="replace").split(" ", 2)[-1])
+    return process is not None and is_gone(process)
 
 
 def _sealed(address: str, parts: tuple[bytes | memoryview, ...]) -> bytes:
