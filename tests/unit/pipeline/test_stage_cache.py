@@ -18,7 +18,8 @@ import numpy as np
 import pytest
 
 import fullwell.pipeline.frame as frame_module
-from fullwell.core.errors import ConflictError, RenderError, StorageError
+from fullwell.core.errors import ConflictError, FieldError, RenderError, StorageError
+from fullwell.core.settings import load_settings
 from fullwell.dataset import encode
 from fullwell.pipeline import RadianceCache, StageStore, plan_frame, render_frame, with_cache_steps
 from fullwell.pipeline import cache as cache_module
@@ -451,6 +452,12 @@ def test_worker_keeps_images_in_the_products_store_within_the_setting(
     else:
         assert seen[0] is not None
         assert (seen[0].store, seen[0].max_bytes) == (store, limit)
+
+
+def test_negative_cache_size_is_refused_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FULLWELL_CACHE_BYTES", "-1")
+    with pytest.raises(FieldError, match="FULLWELL_CACHE_BYTES"):
+        load_settings()
 
 
 def test_render_command_keeps_images_between_runs_unless_told_not_to(recipe: dict[str, Any], tmp_path: Path) -> None:
