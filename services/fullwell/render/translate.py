@@ -39,7 +39,7 @@ from fullwell.scene import (
     Texture,
 )
 from fullwell.scene.tessellate import is_similarity, mesh_of, transform_mesh
-from fullwell.scene.validate import check_scene
+from fullwell.scene.validate import check_scene, may_repeat_faces
 
 __all__ = ["TranslatedScene", "translate"]
 
@@ -330,9 +330,11 @@ def _shape(mi: Any, materials: _Materials, shape_id: str, part: Part, to_world: 
         emission = {"type": "area", "radiance": _spectrum(part.emission.radiance)}
     native = _native_shape(mi, part, to_world)
     if native is None:
-        mesh = _with_whole_normals(transform_mesh(to_world, mesh_of(part.geometry)))
+        local = mesh_of(part.geometry)
+        if emission is not None and may_repeat_faces(local):
+            local = _without_repeated_faces(local)
+        mesh = _with_whole_normals(transform_mesh(to_world, local))
         if emission is not None:
-            mesh = _without_repeated_faces(mesh)
             _check_emitter_area(mesh)
         return _mesh_shape(mi, shape_id, mesh, bsdf, emission)
     native["bsdf"] = bsdf
