@@ -251,13 +251,15 @@ TROUBLE = [StorageError("the disk is full"), ConflictError("a file is in the way
 
 
 @pytest.mark.parametrize("error", TROUBLE, ids=lambda error: type(error).__name__)
-@pytest.mark.parametrize("failing", [{"get"}, {"put"}, {"list"}, {"delete"}, {"get", "put", "list", "delete"}], ids="+".join)
+@pytest.mark.parametrize(
+    "failing", [("get",), ("put",), ("list",), ("delete",), ("get", "put", "list", "delete")], ids="+".join
+)
 def test_trouble_with_the_cache_fails_no_frame(
-    recipe: dict[str, Any], tmp_path: Path, failing: set[str], error: Exception
+    recipe: dict[str, Any], tmp_path: Path, failing: tuple[str, ...], error: Exception
 ) -> None:
     recipe["outputs"] = ["raw.npz"]
     good = make(recipe, LocalStore(tmp_path / "good"), "f", cached=False)
-    faulty: Any = FaultyStore(tmp_path / "faulty", failing, error)
+    faulty: Any = FaultyStore(tmp_path / "faulty", set(failing), error)
     for prefix in ("f", "g"):
         assert make(recipe, faulty, prefix)["products"] == good["products"]
     assert faulty.failures > 0
