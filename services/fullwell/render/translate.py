@@ -134,10 +134,19 @@ def _naming(object_id: str, index: int, number: int) -> Iterator[None]:
 
 _FARTHEST_CENTRE_M = 1e8
 _SMALLEST_REACH_M = 5e-3
-"""The renderer starts rays 9e-5 m (1 + largest coordinate) off a surface, so that rounding does not make it shadow itself."""
+"""Fifty times the distance off a surface at which rays start."""
+
+_RAY_START = 9e-5
+"""Times 1 m + the largest coordinate: how far off a surface the renderer starts rays, so that it does not shadow itself."""
+
+_ONE_SURFACE = 0.1
+"""Share of their area that the triangles' area vectors add up to: none in a body, all in the surface of still water."""
 
 _EMITTER_AREA_TOLERANCE = 0.05
-"""Relative change of a lamp's area, and so of its power, by the rounding of its vertices to single precision."""
+"""Relative change of a lamp's area by the rounding of its vertices to single precision that its radiance may make up for."""
+
+_AREA_ROUNDING = 1e-4
+"""Relative change of a lamp's area that does not matter: a tenth of what the product promises."""
 
 
 def _check_reach(scene: SceneDescription, centre_m: NDArray[np.float64]) -> None:
@@ -331,11 +340,13 @@ def _shape(mi: Any, materials: _Materials, shape_id: str, part: Part, to_world: 
     native = _native_shape(mi, part, to_world)
     if native is None:
         local = mesh_of(part.geometry)
-        if emission is not None and may_repeat_faces(local):
+        if part.emission is not None and may_repeat_faces(local):
             local = _without_repeated_faces(local)
         mesh = _with_whole_normals(transform_mesh(to_world, local))
-        if emission is not None:
-            _check_emitter_area(mesh)
+        if emission is not None and part.emission is not None:
+            emission["radiance"] = _spectrum(_power_kept(mesh, part.emission.radiance))
+        if isinstance(part.material, Dielectric):
+            _check_glass_thickness(mesh)
         return _mesh_shape(mi, shape_id, mesh, bsdf, emission)
     native["bsdf"] = bsdf
     if emission is not None:
@@ -390,13 +401,39 @@ def _without_repeated_faces(mesh: Mesh) -> Mesh:
     return mesh if len(first) == len(mesh.faces) else replace(mesh, faces=mesh.faces[np.sort(first)])
 
 
-def _check_emitter_area(mesh: Mesh) -> None:
-    """Refuse a lamp whose power would be wrong because its vertices are too far away for single precision."""
-    areas = [_area_m2(mesh, kind) for kind in (np.float64, np.float32)]
-    if not abs(areas[1] - areas[0]) <= _EMITTER_AREA_TOLERANCE * areas[0]:
+def _power_kept(mesh: Mesh, radiance: Spectrum) -> Spectrum:
+    """Return the radiance that gives the lamp its power after its vertices are rounded to single precision.
+
+    Only lamps of less than about 1e-4 of their distance change. Refused are those whose area changes much.
+    """
+    exact, rounded = (_area_m2(mesh, kind) for kind in (np.float64, np.float32))
+    if not abs(rounded - exact) <= _EMITTER_AREA_TOLERANCE * exact:
         raise FieldError(
-            f"its area of {areas[0]:.3g} m2 becomes {areas[1]:.3g} m2 in single precision at its distance from the camera; "
+            f"its area of {exact:.3g} m2 becomes {rounded:.3g} m2 in single precision at its distance from the camera; "
             f"must keep to {_EMITTER_AREA_TOLERANCE:.0%}. Make it a point light, or a sphere or disk, which stay exact.",
+            path="geometry",
+        )
+    return radiance if abs(rounded - exact) <= _AREA_ROUNDING * exact else radiance.scaled(exact / rounded)
+
+
+def _check_glass_thickness(mesh: Mesh) -> None:
+    """Refuse a pane of glass whose second side rays would skip, because they start that far off the first."""
+    low, high = mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)
+    nearest_m = float(np.maximum(np.maximum(low, -high), 0.0).max())
+    skipped_m = _RAY_START * (1.0 + nearest_m)
+    corners = mesh.vertices_m[mesh.faces]
+    crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    doubled = np.linalg.norm(crossed, axis=1)
+    if np.linalg.norm(crossed.sum(axis=0)) > _ONE_SURFACE * doubled.sum():
+        return
+    # The extent along the normal of the largest triangle is a pane's thickness, whatever its pose.
+    largest = int(doubled.argmax())
+    heights = (mesh.vertices_m - corners[largest, 0]) @ (crossed[largest] / doubled[largest])
+    thickness_m = float(np.ptp(heights))
+    if thickness_m < skipped_m:
+        raise FieldError(
+            f"its glass of {thickness_m:.2g} m is {nearest_m:.3g} m away from the camera, where rays skip {skipped_m:.2g} m; "
+            "must be thicker. Leave the pane out, or move the camera nearer.",
             path="geometry",
         )
 

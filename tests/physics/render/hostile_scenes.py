@@ -208,6 +208,11 @@ def furnished_box() -> Shot:
     return Shot((inward, *balls), (), view, spp=1024, depth=128)
 
 
+def small_lamp(size_m: float) -> SceneObject:
+    """Return a square lamp of 1 W sr^-1 nm^-1 straight down, whatever its size."""
+    return lamp(Rectangle((size_m, size_m)), constant(size_m**-2))
+
+
 def scaled(size: float, shape: Geometry | None = None) -> Shot:
     """Return a box, its ground, a lamp and the camera, all `size` times as large."""
     objects = (
@@ -229,6 +234,20 @@ def behind(*glass: SceneObject) -> Shot:
     back = made(Rectangle((1.0, 40.0)), BLACK, shifted(z=-3.0), "bar")
     wall = SceneObject("wall", "", (Part(Rectangle((40.0, 40.0)), BLACK, emission=Emission(ONE)),), shifted(z=-4.0))
     return Shot((wall, back, *glass), (), camera(rows=12, cols=16, hfov_deg=20), spp=256, depth=32)
+
+
+def pane(thickness_m: float) -> Shot:
+    """Return light seen through a pane at normal incidence."""
+    wall = SceneObject("wall", "", (Part(Rectangle((40.0, 40.0)), BLACK, emission=Emission(ONE)),), shifted(z=-4.0))
+    glass = made(Cube((30, 30, thickness_m)), Dielectric(1.5, 1.0))
+    return Shot((wall, glass), (), camera(rows=12, cols=16, hfov_deg=0.5), spp=1024, depth=64)
+
+
+def water() -> Shot:
+    """Return light that water of one surface with the least of waves, and a white bottom, send back whole."""
+    waves = Mesh(30 * QUAD + [[0, 0, 1e-4], [0, 0, 0], [0, 0, -1e-4], [0, 0, 0]], QUAD_FACES)
+    objects = (made(waves, Dielectric(1.33, 1.0)), made(Rectangle((60, 60)), WHITE, shifted(z=-0.5), "bottom"))
+    return Shot(objects, DOME, camera(origin=(0, 0, 100), rows=12, cols=16, hfov_deg=5), spp=1024, depth=512)
 
 
 def split_lamp(columns: int, rows: int) -> tuple[SceneObject, ...]:
@@ -309,6 +328,11 @@ _SHAPES = [
         "millimetre lamp 100 km away",
         lambda: lit_by(replace(lamp(Cube((2e-3,) * 3)), to_world=shifted(3e4, 0, 1e5))),
         ("object 'lamp', part 0", "single precision"),
+    ),
+    Hostile(
+        "glass pane of 0.01 mm",
+        lambda: behind(made(Cube((30, 30, 1e-5)), Dielectric(1.5, 1.0), shifted(z=1))),
+        (THING, "glass", "thicker"),
     ),
     Hostile("micrometre scene", lambda: scaled(1e-6), ("must reach", "Scale")),
 ]
@@ -451,6 +475,8 @@ _IMAGES = [
     Hostile("glass of index 1", lambda: behind(made(Sphere(), Dielectric(1.0, 1.0))), twin=behind),
     Hostile("glass of equal indices", lambda: behind(made(Sphere(), Dielectric(1.5, 1.5))), twin=behind),
     Hostile("frosted glass of equal indices", lambda: behind(made(Sphere(), Dielectric(1.5, 1.5, 0.2))), twin=behind),
+    Hostile("glass pane of 1 mm", lambda: pane(1e-3), twin=lambda: pane(1e-1)),
+    Hostile("water surface 100 m away", water, level=1.0),
     Hostile("bubble in glass", lambda: of(Dielectric(1.0, 1.5)), level=1.0),
     Hostile("glass of roughness 1e-6", lambda: of(Dielectric(1.5, 1.0, 1e-6)), twin=lambda: of(Dielectric(1.5, 1.0))),
     Hostile("metal of roughness 1e-6", lambda: of(silver(1e-6)), twin=lambda: of(silver(0.0))),
@@ -480,6 +506,7 @@ _IMAGES = [
     Hostile("light from below the ground", lambda: lit(PointLight((0, 0, -2), ONE)), level=0.0),
     Hostile("light at 0.01 degrees", lambda: grazing(1e-2), level=0.5 / np.pi * np.sin(np.radians(1e-2))),
     Hostile("repeated triangles in a lamp", lambda: lit_by(lamp(_REPEATED)), twin=lambda: lit_by(lamp(quad()))),
+    Hostile("lamp of a micrometre", lambda: lit_by(small_lamp(1e-6)), twin=lambda: lit_by(small_lamp(1e-3))),
     Hostile("flat triangles in a lamp", lambda: lit_by(lamp(_LAMP_WITH_FLAT_TRIANGLES)), twin=lambda: lit_by(lamp(quad()))),
     Hostile("flat triangles in a mesh", lambda: under(quad(faces=DEGENERATE)), twin=lambda: under(quad())),
     Hostile("repeated triangles in a mesh", lambda: under(_REPEATED), twin=lambda: under(quad())),
