@@ -19,6 +19,7 @@ from fullwell.render.rays import CameraRays
 from fullwell.render.translate import TranslatedScene, translate
 from fullwell.render.variant import activate
 from fullwell.scene import Camera, SceneDescription
+from fullwell.scene.validate import check_camera
 
 __all__ = ["RenderStatistics", "render_radiance"]
 
@@ -78,12 +79,15 @@ def render_radiance(
 
     Raises
     ------
+    FieldError
+        The camera or a part of the scene cannot be rendered; the message names it.
     RenderError
         The renderer refused the scene or produced too many invalid samples.
     CancelledError
         `should_cancel` returned true.
     """
     started, cpu_started = time.perf_counter(), time.process_time()
+    check_camera(camera)
     mi = activate()
     translated = translate(mi, scene, camera.camera_to_world[:3, 3])
     task = _Task(mi, translated, camera, grid, samples_per_pixel, max_depth, seed)

@@ -13,6 +13,7 @@ from fullwell.render.rays import CameraRays
 from fullwell.render.translate import TranslatedScene, translate
 from fullwell.render.variant import activate
 from fullwell.scene import Camera, SceneDescription, SurfaceHits
+from fullwell.scene.validate import check_camera
 
 __all__ = ["query_surfaces"]
 
@@ -33,11 +34,14 @@ def query_surfaces(
 
     Raises
     ------
+    FieldError
+        The camera or a part of the scene cannot be rendered; the message names it.
     RenderError
         The renderer refused the scene.
     CancelledError
         `should_cancel` returned true between two layers.
     """
+    check_camera(camera)
     mi = activate()
     translated = translate(mi, scene, camera.camera_to_world[:3, 3])
     try:

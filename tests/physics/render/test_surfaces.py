@@ -10,9 +10,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fullwell.radiometry import Spectrum
-from fullwell.render import query_surfaces
-from fullwell.scene import Camera, Cube, Diffuse, Film, Lens, Part, Rectangle, SceneDescription, SceneObject, Sphere, look_at
+from fullwell.core.errors import FieldError
+from fullwell.radiometry import Spectrum, WavelengthGrid
+from fullwell.render import query_surfaces, render_radiance
+from fullwell.scene import (
+    Camera,
+    ConstantEnvironment,
+    Cube,
+    Diffuse,
+    Film,
+    Lens,
+    Part,
+    Rectangle,
+    SceneDescription,
+    SceneObject,
+    Sphere,
+    look_at,
+)
 
 GREY = Diffuse(Spectrum.constant(0.5))
 
@@ -87,3 +101,16 @@ def test_scalar_and_compiled_queries_agree() -> None:
         return subprocess.run(command, env={**os.environ, **variables}, check=True, capture_output=True, text=True).stdout
 
     assert run(FULLWELL_VARIANT="scalar_spectral") == run()
+
+
+@pytest.mark.parametrize("scale", [0.0, 2.0, float("nan")])
+def test_camera_that_is_no_camera_is_refused_before_it_makes_a_wrong_picture(scale: float) -> None:
+    good = camera()
+    pose = good.camera_to_world.copy()
+    pose[:3, :3] *= scale
+    bad = Camera(good.name, pose, good.lens, good.film)
+    scene = SceneDescription((placed("ball", Sphere(1.0)),), (ConstantEnvironment(Spectrum.constant(1.0)),))
+    with pytest.raises(FieldError, match="camera_to_world"):
+        query_surfaces(scene, bad)
+    with pytest.raises(FieldError, match="camera_to_world"):
+        render_radiance(scene, bad, WavelengthGrid(), samples_per_pixel=1, max_depth=2, seed=0)
