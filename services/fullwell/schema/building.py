@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fullwell.core.errors import FieldError
 from fullwell.core.hashing import canonical_json
 from fullwell.schema.errors import RecipeError
 from fullwell.schema.loading import document_of
@@ -87,6 +88,7 @@ class RecipeBuilder:
     def validate(self) -> tuple[str, ...]:
         """See the function `validate`."""
         first = self.frame(0)
+        _check_renderable(first)
         vary = self._document.vary
         if vary is None:
             return first.warnings
@@ -97,7 +99,7 @@ class RecipeBuilder:
             try:
                 changed = _varied_document(self._document, {**values, path: value})
                 if number < _BUILT_VALUES:
-                    self._build(changed, values, 0)
+                    _check_renderable(self._build(changed, values, 0))
             except RecipeError as error:
                 raise _told(error, f"{where} sets {path}.") from error
         return first.warnings
@@ -141,6 +143,18 @@ class RecipeBuilder:
 def _told(error: RecipeError, circumstance: str) -> RecipeError:
     shown = circumstance if len(circumstance) <= 300 else circumstance[:297] + "..."
     return RecipeError(f"{error.message} ({shown})", error.path, error.value)
+
+
+def _check_renderable(frame: FrameDescription) -> None:
+    """Raise RecipeError for what the renderer would refuse when its turn comes: the same checks, before any work."""
+    from fullwell.scene.validate import check_camera, check_scene  # noqa: PLC0415
+
+    try:
+        check_scene(frame.scene)
+        for rig in frame.cameras:
+            check_camera(rig.camera)
+    except FieldError as error:
+        raise RecipeError(error.message, error.path, error.value) from error
 
 
 def _scalar(value: Any) -> str | int | float | bool:

@@ -94,6 +94,11 @@ def test_validate_says_how_many_frames(recipe: Path) -> None:
         ("scene.objects=[]", "scene"),
         ("cameras[0].pose.origin_m=[0, 0.1, 0.5]", "inside the opaque object 'ball'"),
         ("scene.objects[1].geometry={kind: model, file: no.glb}", "does not exist"),
+        (
+            "scene.lights=[{name: beam, kind: spot, position_m: [0, 0, 3], direction: [0, 0, -1], beam_deg: 0.01, "
+            "cutoff_deg: 0.05, luminous_intensity_cd: 9, spd: A}]",
+            "cutoff_deg >= 0.2",
+        ),
     ],
 )
 def test_nonsense_gets_one_clear_error_and_leaves_nothing_behind(
