@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,10 +11,17 @@ from numpy.typing import NDArray
 
 from fullwell.core.errors import FieldError, FullwellError, RenderError
 from fullwell.radiometry.spectrum import Spectrum
+from fullwell.render.conditioning import (
+    check_glass_thickness,
+    check_reach,
+    naming,
+    power_kept,
+    with_whole_normals,
+    without_repeated_faces,
+)
 from fullwell.scene import (
     Conductor,
     ConstantEnvironment,
-    Cube,
     Cylinder,
     Dielectric,
     Diffuse,
@@ -30,7 +35,6 @@ from fullwell.scene import (
     Part,
     PointLight,
     Principled,
-    Rectangle,
     RoughPlastic,
     SceneDescription,
     Sphere,
@@ -94,7 +98,7 @@ def translate(mi: Any, scene: SceneDescription, centre_m: NDArray[np.float64]) -
 
 def _load(mi: Any, scene: SceneDescription, centre_m: NDArray[np.float64]) -> TranslatedScene:
     check_scene(scene)
-    _check_reach(scene, centre_m)
+    check_reach(scene, centre_m)
     recentre = np.eye(4)
     recentre[:3, 3] = -np.asarray(centre_m, dtype=np.float64)
     contents: dict[str, Any] = {"type": "scene"}
@@ -105,7 +109,7 @@ def _load(mi: Any, scene: SceneDescription, centre_m: NDArray[np.float64]) -> Tr
             for number, part in enumerate(scene_object.parts):
                 shape_id = f"o{index}_{number}"
                 to_world = recentre @ scene_object.to_world @ part.to_object
-                with _naming(scene_object.id, index, number):
+                with naming(scene_object.id, index, number):
                     contents[shape_id] = _shape(mi, materials, shape_id, part, to_world)
                 object_of_shape[shape_id] = index
         for number, light in enumerate(scene.lights):
@@ -118,70 +122,6 @@ def _load(mi: Any, scene: SceneDescription, centre_m: NDArray[np.float64]) -> Tr
         cause = error.__cause__ or error
         raise RenderError(f"the renderer refused the scene: {cause}") from error
     return TranslatedScene(loaded, object_of_shape, np.asarray(centre_m, dtype=np.float64))
-
-
-@contextmanager
-def _naming(object_id: str, index: int, number: int) -> Iterator[None]:
-    """Put the object's id and the part before a refusal of one shape."""
-    try:
-        yield
-    except FieldError as error:
-        path = f"scene.objects[{index}].parts[{number}].{error.path}".rstrip(".")
-        raise FieldError(f"object {object_id!r}, part {number}: {error.message}", path, error.value) from error
-
-
-# Sizes ---------------------------------------------------------------------------------------------------------------
-
-_FARTHEST_CENTRE_M = 1e8
-_SMALLEST_REACH_M = 5e-3
-"""Fifty times the distance off a surface at which rays start."""
-
-_RAY_START = 9e-5
-"""Times 1 m + the largest coordinate: how far off a surface the renderer starts rays, so that it does not shadow itself."""
-
-_ONE_SURFACE = 0.1
-"""Share of their area that the triangles' area vectors add up to: none in a body, all in the surface of still water."""
-
-_EMITTER_AREA_TOLERANCE = 0.05
-"""Relative change of a lamp's area by the rounding of its vertices to single precision that its radiance may make up for."""
-
-_AREA_ROUNDING = 1e-4
-"""Relative change of a lamp's area that does not matter: a tenth of what the product promises."""
-
-
-def _check_reach(scene: SceneDescription, centre_m: NDArray[np.float64]) -> None:
-    """Refuse a camera that is nowhere, and a scene so small that rays skip over its shapes."""
-    if not np.all(np.abs(centre_m) <= _FARTHEST_CENTRE_M):
-        raise FieldError(
-            f"the camera stands at {np.asarray(centre_m).tolist()}; must be finite and within {_FARTHEST_CENTRE_M:g} m of the "
-            "origin.",
-            path="camera_to_world",
-        )
-    if not scene.objects:
-        return
-    reach_m = max(_reach_m(part, item.to_world @ part.to_object, centre_m) for item in scene.objects for part in item.parts)
-    if reach_m < _SMALLEST_REACH_M:
-        raise FieldError(
-            f"the scene lies within {reach_m:.2g} m of the camera; must reach >= {_SMALLEST_REACH_M:g} m. Scale the scene, "
-            "the camera's pupil and the distances of lights up together: radiance does not change.",
-            path="scene.objects",
-        )
-
-
-def _reach_m(part: Part, to_world: NDArray[np.float64], centre_m: NDArray[np.float64]) -> float:
-    """Return a coordinate [m] from the camera that no point of the part exceeds, at most three times too large."""
-    match part.geometry:
-        case Mesh(vertices_m=vertices):
-            corners = np.array([vertices.min(axis=0), vertices.max(axis=0)])
-        case Sphere(radius_m=radius) | Disk(radius_m=radius):
-            corners = np.array([[-radius] * 3, [radius] * 3])
-        case Cylinder(radius_m=radius, height_m=height):
-            corners = np.array([[-radius, -radius, -height / 2], [radius, radius, height / 2]])
-        case Rectangle(size_m=size) | Cube(size_m=size):
-            half = np.resize(np.append(size, 0.0), 3) / 2
-            corners = np.array([-half, half])
-    middle = to_world[:3, :3] @ corners.mean(axis=0) + to_world[:3, 3] - centre_m
-    return float((np.abs(middle) + np.abs(to_world[:3, :3]) @ (corners[1] - corners[0]) / 2).max())
 
 
 # Spectra -------------------------------------------------------------------------------------------------------------
@@ -341,12 +281,12 @@ def _shape(mi: Any, materials: _Materials, shape_id: str, part: Part, to_world: 
     if native is None:
         local = mesh_of(part.geometry)
         if part.emission is not None and may_repeat_faces(local):
-            local = _without_repeated_faces(local)
-        mesh = _with_whole_normals(transform_mesh(to_world, local))
+            local = without_repeated_faces(local)
+        mesh = with_whole_normals(transform_mesh(to_world, local))
         if emission is not None and part.emission is not None:
-            emission["radiance"] = _spectrum(_power_kept(mesh, part.emission.radiance))
+            emission["radiance"] = _spectrum(power_kept(mesh, part.emission.radiance))
         if isinstance(part.material, Dielectric):
-            _check_glass_thickness(mesh)
+            check_glass_thickness(mesh)
         return _mesh_shape(mi, shape_id, mesh, bsdf, emission)
     native["bsdf"] = bsdf
     if emission is not None:
@@ -375,73 +315,6 @@ def _native_shape(mi: Any, part: Part, to_world: NDArray[np.float64]) -> dict[st
             }
         case _:
             return None
-
-
-def _with_whole_normals(mesh: Mesh) -> Mesh:
-    """Return the mesh with the mean normal of its triangles where a vertex has a zero normal, which would be black."""
-    if mesh.normals is None:
-        return mesh
-    zero = ~np.any(mesh.normals, axis=1)
-    if not zero.any():
-        return mesh
-    corners = mesh.vertices_m[mesh.faces]
-    crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    sums = np.zeros(mesh.normals.shape)
-    np.add.at(sums, mesh.faces, crossed[:, None, :])
-    length = np.linalg.norm(sums, axis=1, keepdims=True)
-    mean = np.divide(sums, length, out=np.zeros_like(sums), where=length > 0)
-    return replace(mesh, normals=np.where(zero[:, None], mean, mesh.normals))
-
-
-def _without_repeated_faces(mesh: Mesh) -> Mesh:
-    """Return the mesh with each triangle once: a lamp would shine from each copy."""
-    _, corner = np.unique(mesh.vertices_m, axis=0, return_inverse=True)
-    named = np.sort(corner.reshape(-1)[mesh.faces], axis=1)
-    _, first = np.unique(named, axis=0, return_index=True)
-    return mesh if len(first) == len(mesh.faces) else replace(mesh, faces=mesh.faces[np.sort(first)])
-
-
-def _power_kept(mesh: Mesh, radiance: Spectrum) -> Spectrum:
-    """Return the radiance that gives the lamp its power after its vertices are rounded to single precision.
-
-    Only lamps of less than about 1e-4 of their distance change. Refused are those whose area changes much.
-    """
-    exact, rounded = (_area_m2(mesh, kind) for kind in (np.float64, np.float32))
-    if not abs(rounded - exact) <= _EMITTER_AREA_TOLERANCE * exact:
-        raise FieldError(
-            f"its area of {exact:.3g} m2 becomes {rounded:.3g} m2 in single precision at its distance from the camera; "
-            f"must keep to {_EMITTER_AREA_TOLERANCE:.0%}. Make it a point light, or a sphere or disk, which stay exact.",
-            path="geometry",
-        )
-    return radiance if abs(rounded - exact) <= _AREA_ROUNDING * exact else radiance.scaled(exact / rounded)
-
-
-def _check_glass_thickness(mesh: Mesh) -> None:
-    """Refuse a pane of glass whose second side rays would skip, because they start that far off the first."""
-    low, high = mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)
-    nearest_m = float(np.maximum(np.maximum(low, -high), 0.0).max())
-    skipped_m = _RAY_START * (1.0 + nearest_m)
-    corners = mesh.vertices_m[mesh.faces]
-    crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    doubled = np.linalg.norm(crossed, axis=1)
-    if np.linalg.norm(crossed.sum(axis=0)) > _ONE_SURFACE * doubled.sum():
-        return
-    # The extent along the normal of the largest triangle is a pane's thickness, whatever its pose.
-    largest = int(doubled.argmax())
-    heights = (mesh.vertices_m - corners[largest, 0]) @ (crossed[largest] / doubled[largest])
-    thickness_m = float(np.ptp(heights))
-    if thickness_m < skipped_m:
-        raise FieldError(
-            f"its glass of {thickness_m:.2g} m is {nearest_m:.3g} m away from the camera, where rays skip {skipped_m:.2g} m; "
-            "must be thicker. Leave the pane out, or move the camera nearer.",
-            path="geometry",
-        )
-
-
-def _area_m2(mesh: Mesh, rounded_to: type[np.float32 | np.float64]) -> float:
-    corners = mesh.vertices_m.astype(rounded_to).astype(np.float64)[mesh.faces]
-    crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return float(np.linalg.norm(crossed, axis=1).sum() / 2)
 
 
 def _transform(mi: Any, matrix: NDArray[np.float64]) -> Any:

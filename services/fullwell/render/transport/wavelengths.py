@@ -20,7 +20,7 @@ that the power of a line of any width is kept."""
 
 def cell_centres_nm() -> NDArray[np.float64]:
     """Return the (CELL_COUNT,) middles of the cells [nm]."""
-    return FIRST_EDGE_NM + CELL_NM * (np.arange(CELL_COUNT) + 0.5)
+    return np.asarray(FIRST_EDGE_NM + CELL_NM * (np.arange(CELL_COUNT) + 0.5), dtype=np.float64)
 
 
 def cell_means(spectrum: Spectrum) -> NDArray[np.float32]:
