@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fullwell.radiometry.spectrum import Spectrum
+from fullwell.render.transport.upload import upload
 
 __all__ = ["CELL_COUNT", "CELL_NM", "FIRST_EDGE_NM", "SpectraTable", "cell_centres_nm", "cell_means", "look_up"]
 
@@ -74,7 +75,7 @@ class SpectraTable:
 
     def finish(self, mi: Any) -> Any:
         """Return the table as one flat device array: row r's cell c is at r * CELL_COUNT + c."""
-        return mi.Float(self.values().ravel())
+        return upload(mi.Float, self.values())
 
 
 def look_up(mi: Any, table: Any, row: Any, cells: list[Any]) -> Any:

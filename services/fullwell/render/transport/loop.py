@@ -1,0 +1,295 @@
+"""The path loop: camera rays in, sums of channel responses and of spectral bands out, in one kernel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from fullwell.render.rays import CameraRays
+from fullwell.render.transport.geometry import Geometry, Tables
+from fullwell.render.transport.lights import LightSet
+from fullwell.render.transport.materials import MaterialTable
+from fullwell.render.transport.sampler import PathSampler
+from fullwell.render.transport.wavelengths import CELL_COUNT, CELL_NM, FIRST_EDGE_NM, look_up
+
+__all__ = ["SLOTS", "Launch", "PathLoop", "PathSums"]
+
+SLOTS = 4096
+"""Equal shares of probability that wavelengths are drawn from; a cell has a whole number of them."""
+
+_NO_LEAF = 0xFFFFFFFF
+_SHADOW_SHARE = 1.0 - 5e-5
+"""Share of the way to a lamp that a shadow ray looks at; the rest holds the lamp's own surface."""
+
+_CAMERA_PAIRS = 3
+_BOUNCE_PAIRS = 4
+_ROULETTE_START = 3
+_MOST_LIKELY = 0.95
+
+
+class Launch:
+    """The work of one launch, by lane: film sample `pixel`, sequence `seed`, samples [first, first + count) of it; and for
+    bands, the `offset` of each lane's first band.
+
+    Not a dataclass: Dr.Jit would take it for loop state.
+    """
+
+    def __init__(self, *, pixel: Any, seed: Any, first: Any, count: Any, offset: Any) -> None:
+        self.pixel, self.seed, self.first, self.count, self.offset = pixel, seed, first, count, offset
+
+
+class _Inputs:
+    """What the loop reads and never changes, kept out of its state in the same way."""
+
+    def __init__(self, scene: Any, camera: CameraRays, tables: Tables, launch: Launch, film: Any) -> None:
+        self.scene, self.camera, self.tables, self.launch, self.film = scene, camera, tables, launch, film
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PathSums:
+    """Sums over each lane's samples: `channels[group][channel]` arrays, `bands` flat (lane, group, band) or None, `bad`
+    samples and `segments` traced."""
+
+    channels: list[list[Any]]
+    bands: Any | None
+    bad: Any
+    segments: Any
+
+
+class PathLoop:
+    """One kind of kernel. What differs between scenes of the same kind is data in `tables`.
+
+    Parameters
+    ----------
+    wavelengths
+        Number that a path carries.
+    channels, groups
+        Numbers of sensor channels and of light groups that are kept apart.
+    bands
+        Whether spectral bands are kept too. Wavelengths then visit the bands by turns; otherwise they follow `slots`.
+    """
+
+    def __init__(
+        self,
+        mi: Any,
+        geometry: Geometry,
+        materials: MaterialTable,
+        lights: LightSet,
+        *,
+        wavelengths: int,
+        channels: int,
+        groups: int,
+        bands: bool,
+    ) -> None:
+        import drjit as dr  # noqa: PLC0415 - the renderer is loaded late
+
+        self._mi, self._dr = mi, dr
+        self._geometry, self._materials, self._lights = geometry, materials, lights
+        self._wavelengths, self._channels, self._groups, self._bands = wavelengths, channels, groups, bands
+
+    def trace(self, scene: Any, camera: CameraRays, tables: Tables, launch: Launch) -> PathSums:
+        """Return the sums of a launch.
+
+        `tables` are those of the geometry with, beside them, ``spectra``, ``responses`` (channel, cell), ``slots``,
+        ``columns``, ``max_depth``, ``band_count``, ``band_first_nm`` and ``band_step_nm``.
+        """
+        import drjit as dr  # noqa: PLC0415
+
+        mi = self._mi
+        lanes = dr.width(launch.pixel)
+        film = None
+        if self._bands:
+            film = dr.zeros(mi.Float, lanes * self._groups * tables["band_count_host"])
+        channels, bad, segments = _decorated(dr)(self, _Inputs(scene, camera, tables, launch, film), lanes)
+        return PathSums(channels, film, bad, segments)
+
+    def _added(self, radiance: list[Any], value: Any, group: Any) -> list[Any]:
+        """Return the groups' radiances with `value` added to that of its group."""
+        if self._groups == 1:
+            return [radiance[0] + value]
+        return [kept + self._dr.select(group == number, value, 0.0) for number, kept in enumerate(radiance)]
+
+    def _camera_sample(self, camera: CameraRays, tables: Tables, launch: Launch, sample: Any) -> tuple[Any, Any, Any]:
+        """Return origin, direction and wavelength cells of a new path."""
+        mi, dr = self._mi, self._dr
+        numbers = PathSampler(mi, launch.seed, sample)
+        row = launch.pixel // tables["columns"]
+        jitter = numbers.pair(0)
+        x_px, y_px = mi.Float(launch.pixel - row * tables["columns"]) + jitter.x, mi.Float(row) + jitter.y
+        origin, direction = camera.through_lens(x_px, y_px, numbers.pair(1))
+        u = numbers.pair(2).x
+        if self._bands:
+            cells = []
+            for band in self._bands_of(tables, launch, sample):
+                nm = tables["band_first_nm"] + tables["band_step_nm"] * (mi.Float(band) + u)
+                cells.append(mi.UInt32(dr.clip((nm - FIRST_EDGE_NM) * (1.0 / CELL_NM), 0.0, CELL_COUNT - 1.0)))
+        else:
+            cells = []
+            for k in range(self._wavelengths):
+                shifted = u + k / self._wavelengths
+                shifted = dr.select(shifted >= 1.0, shifted - 1.0, shifted)
+                slot = dr.minimum(mi.UInt32(shifted * SLOTS), SLOTS - 1)
+                cells.append(dr.gather(mi.UInt32, tables["slots"], slot))
+        return origin, direction, dr.llvm.ad.ArrayXu(cells)
+
+    def _bands_of(self, tables: Tables, launch: Launch, sample: Any) -> list[Any]:
+        """Return the bands of a path's wavelengths.
+
+        Decided by counting, not by chance: sample s of a lane visits the bands s + offset + k B / W modulo B, so each band
+        gets the same number of samples to within a few, known beforehand.
+        """
+        bands = []
+        for shift in tables["band_shifts"]:
+            position = sample + launch.offset + shift
+            bands.append(position - (position // tables["band_count"]) * tables["band_count"])
+        return bands
+
+    def _to_channels(self, tables: Tables, radiance: Any, cells: Any) -> list[Any]:
+        """Return the channels' responses to a path's spectral radiance; the weights hold the density of the wavelengths."""
+        mi, dr = self._mi, self._dr
+        sums = []
+        for channel in range(self._channels):
+            total = mi.Float(0)
+            for k in range(self._wavelengths):
+                weight = dr.gather(mi.Float, tables["responses"], cells[k] + channel * CELL_COUNT)
+                total = dr.fma(radiance[k], weight, total)
+            sums.append(total)
+        return sums
+
+
+_compiled: list[Any] = []
+
+
+def _decorated(dr: Any) -> Any:
+    """Return the loop with its control flow rewritten; made once, when the renderer is there."""
+    if not _compiled:
+        _compiled.append(dr.syntax(_loop_body))
+    return _compiled[0]
+
+
+def _loop_body(self, given, lanes):  # type: ignore[no-untyped-def]
+    import drjit as dr  # noqa: PLC0415
+
+    mi = self._mi
+    spectral = dr.llvm.ad.ArrayXf
+    count = self._wavelengths
+
+    def zeros():  # type: ignore[no-untyped-def]
+        return spectral([dr.zeros(mi.Float, lanes) for _ in range(count)])
+
+    sample = given.launch.first + dr.zeros(mi.UInt32, lanes)
+    end = sample + given.launch.count
+    active = sample < end
+    fresh = dr.full(mi.Mask, True, lanes)
+    origin, direction = dr.zeros(mi.Point3f, lanes), dr.zeros(mi.Vector3f, lanes)
+    cells = dr.llvm.ad.ArrayXu([dr.zeros(mi.UInt32, lanes) for _ in range(count)])
+    throughput = zeros()
+    radiance = [zeros() for _ in range(self._groups)]
+    last_normal = dr.zeros(mi.Vector3f, lanes)
+    last_density = dr.zeros(mi.Float, lanes)
+    depth = dr.zeros(mi.UInt32, lanes)
+    eta = dr.full(mi.Float, 1, lanes)
+    sums = [[dr.zeros(mi.Float, lanes) for _ in range(self._channels)] for _ in range(self._groups)]
+    bad = dr.zeros(mi.UInt32, lanes)
+    segments = dr.zeros(mi.UInt32, lanes)
+
+    while active:
+        if fresh:
+            origin, direction, cells = self._camera_sample(given.camera, given.tables, given.launch, sample)
+            throughput = spectral([mi.Float(1) for _ in range(count)])
+            radiance = [spectral([mi.Float(0) for _ in range(count)]) for _ in range(self._groups)]
+            last_density = mi.Float(0)  # nothing but the camera ray itself could have found what it hits
+            last_normal = mi.Vector3f(0)
+            depth = mi.UInt32(0)
+            eta = mi.Float(1)
+        cell_list = [cells[k] for k in range(count)]
+        wavelengths_nm = [FIRST_EDGE_NM + CELL_NM * (mi.Float(cell) + 0.5) for cell in cell_list]
+        numbers = PathSampler(mi, given.launch.seed, sample)
+        first_pair = _CAMERA_PAIRS + _BOUNCE_PAIRS * depth
+        ray = mi.Ray3f(o=origin, d=direction)
+        hit = self._geometry.intersect(given.tables, given.scene, ray, active)
+        segments += dr.select(active, 1, 0)
+
+        # Emission met by the ray, weighted against the chance that light sampling had found it
+        if self._lights.has_surfaces:
+            shines = hit.valid & (hit.leaf != _NO_LEAF) & (dr.dot(hit.front_normal, direction) < 0)
+            if shines:
+                row, group = self._lights.hit_emission(hit.leaf, shines)
+                other = self._lights.hit_density(
+                    hit.leaf, origin, last_normal, direction, hit.distance, hit.front_normal, shines & (last_density > 0)
+                )
+                share = dr.select(last_density > 0, last_density / (last_density + other), 1.0)
+                radiance = self._added(radiance, throughput * look_up(mi, given.tables["spectra"], row, cell_list) * share, group)
+        if self._lights.has_escaped:
+            escaped = active & ~hit.valid
+            if escaped:
+                other = self._lights.escaped_density(last_normal, direction, escaped & (last_density > 0))
+                share = dr.select(last_density > 0, last_density / (last_density + other), 1.0)
+                for value, group in self._lights.escaped(given.tables["spectra"], direction, cell_list, escaped):
+                    radiance = self._added(radiance, throughput * value * share, group)
+
+        depth += 1
+        alive = active & hit.valid & (depth < given.tables["max_depth"])
+        finished = active & ~alive
+        if alive:
+            frame = mi.Frame3f(hit.shading_normal)
+            wi = frame.to_local(-direction)
+            choice, texture_pair = numbers.pair(first_pair + 1), numbers.pair(first_pair + 3)
+            surface = self._materials.at(
+                given.tables["spectra"], hit.material, hit.uv, cell_list, wavelengths_nm, texture_pair.y, alive
+            )
+            facing = dr.select(wi.z < 0, -hit.shading_normal, hit.shading_normal)
+            bound = dr.select(surface.two_sided, facing, mi.Vector3f(0))
+            lit = alive & surface.has_smooth
+            if self._lights.count > 0:  # decided while compiling; the next one is decided on the lanes
+                if lit:
+                    light = self._lights.sample(hit.point, bound, choice.x, numbers.pair(first_pair), lit)
+                    wo = frame.to_local(light.direction)
+                    value, density = surface.evaluate(wi, wo)
+                    useful = lit & (light.pdf > 0) & dr.any(value > 0)
+                    start = hit.start(light.direction, mi, dr)
+                    reach = dr.minimum(light.distance * _SHADOW_SHARE, dr.largest(mi.Float))
+                    shadow = mi.Ray3f(mi.Ray3f(o=start, d=light.direction), reach)
+                    useful &= ~given.scene.ray_test(shadow, coherent=False, active=useful)
+                    share = dr.select(light.delta, 1.0, light.pdf / (light.pdf + density))
+                    arriving = light.radiance(given.tables["spectra"], cell_list) * (share / light.pdf)
+                    sent = dr.select(useful, throughput * value * arriving, 0.0)
+                    radiance = self._added(radiance, sent, light.group)
+
+            bounce = surface.sample(wi, choice.y, numbers.pair(first_pair + 2))
+            onward = frame.to_world(bounce.wo)
+            throughput = throughput * bounce.weight
+            eta = eta * bounce.eta
+            strongest = dr.max(throughput)
+            finished |= alive & ~(strongest > 0)
+            # Russian roulette by what is left of the path's weight; radiance in glass is denser by the index squared
+            survival = dr.select(depth < _ROULETTE_START, 1.0, dr.minimum(strongest * eta * eta, _MOST_LIKELY))
+            finished |= alive & (texture_pair.x >= survival)
+            throughput = throughput * dr.rcp(dr.maximum(survival, 1e-6))
+            origin = hit.start(onward, mi, dr)
+            direction = onward
+            last_density = dr.select(bounce.delta, 0.0, bounce.pdf)
+            last_normal = bound
+
+        if finished:
+            good = dr.full(mi.Mask, True, lanes)
+            for group in range(self._groups):
+                total = dr.sum(radiance[group])
+                good &= dr.isfinite(total) & (dr.min(radiance[group]) >= 0)
+            for group in range(self._groups):
+                for channel, value in enumerate(self._to_channels(given.tables, radiance[group], cells)):
+                    sums[group][channel] += dr.select(good, value, 0.0)
+            if given.film is not None:
+                lane = dr.arange(mi.UInt32, lanes)
+                for k, band in enumerate(self._bands_of(given.tables, given.launch, sample)):
+                    photons = wavelengths_nm[k] * given.tables["photons_per_j_nm"]
+                    for group in range(self._groups):
+                        index = (lane * self._groups + group) * given.tables["band_count"] + band
+                        dr.scatter_add(
+                            given.film, radiance[group][k] * photons, index, finished & good, mode=dr.ReduceMode.NoConflicts
+                        )
+            bad += dr.select(good, 0, 1)
+            sample += 1
+        fresh = finished
+        active &= sample < end
+    return sums, bad, segments

@@ -1,0 +1,352 @@
+"""An image that gets better with every pass: launches of the path loop over lists of pixels, and what they found so far."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fullwell.core.constants import NM_PER_M, PLANCK_J_S, SPEED_OF_LIGHT_M_PER_S
+from fullwell.core.errors import CancelledError, RenderError
+from fullwell.core.rng import seed32
+from fullwell.radiometry import Spectrum, WavelengthGrid
+from fullwell.render.rays import CameraRays
+from fullwell.render.transport.collect import collect_surfaces
+from fullwell.render.transport.geometry import Geometry
+from fullwell.render.transport.lights import LightSet
+from fullwell.render.transport.loop import SLOTS, Launch, PathLoop
+from fullwell.render.transport.materials import MaterialTable
+from fullwell.render.transport.upload import upload
+from fullwell.render.transport.wavelengths import CELL_COUNT, CELL_NM, SpectraTable, cell_centres_nm, cell_means
+from fullwell.scene import Camera, SceneDescription
+
+__all__ = ["REPLICAS", "ProgressiveImage", "Reporter", "Work"]
+
+REPLICAS = 4
+"""Independent sequences per pixel. The spread of their means is the error of the image: each is stratified over all its
+samples, which makes the spread of samples within one no measure of anything."""
+
+_PHOTONS_PER_J_NM = 1.0 / (PLANCK_J_S * SPEED_OF_LIGHT_M_PER_S * NM_PER_M)
+_LANES = 1 << 17
+_SAMPLES_PER_LAUNCH = 1 << 21
+"""Bounds memory and the time between two looks at whether to go on. The result does not depend on either."""
+
+_UNIFORM_SHARE = 0.2
+"""Share of the wavelengths that is spread evenly, so that no colour is left to a few samples of great weight."""
+
+_MAX_BAD_FRACTION = 1e-3
+
+
+class Reporter:
+    """Progress out, cancellation in."""
+
+    def __init__(
+        self, progress: Callable[[float], None] | None = None, should_cancel: Callable[[], bool] | None = None
+    ) -> None:
+        self._progress = progress
+        self._should_cancel = should_cancel
+
+    def __call__(self, fraction: float) -> None:
+        """Tell how far the work is; raise CancelledError where it is no longer wanted."""
+        if self._should_cancel is not None and self._should_cancel():
+            raise CancelledError("rendering was cancelled between two passes; nothing was written")
+        if self._progress is not None:
+            self._progress(min(1.0, fraction))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Work:
+    """What is rendered.
+
+    Attributes
+    ----------
+    responses
+        Electrons per photon of each channel: filters, quantum efficiency and the lens's transmittance. May be empty.
+    grid
+        The bands; also the range outside which no light counts.
+    keep_bands
+        Whether the spectral bands are kept beside the channels.
+    keep_groups
+        Whether each light group has an image of its own.
+    max_depth
+        Segments of the longest path: 1 shows lamps only, 2 adds direct light.
+    wavelengths
+        Number that a path carries.
+    group_importance
+        Factor by which the lamps of a group are sampled more often, by the group's name; 1 for those left out.
+    """
+
+    scene: SceneDescription
+    camera: Camera
+    grid: WavelengthGrid
+    responses: tuple[Spectrum, ...]
+    keep_bands: bool
+    keep_groups: bool
+    max_depth: int
+    seed: int
+    wavelengths: int = 8
+    group_importance: tuple[tuple[str, float], ...] = ()
+
+
+class ProgressiveImage:
+    """Sums of samples so far. `add` takes more of them, anywhere; everything else looks at what is there."""
+
+    def __init__(self, mi: Any, work: Work) -> None:
+        self._mi, self._work = mi, work
+        surfaces = collect_surfaces(work.scene, work.camera.camera_to_world[:3, 3])
+        self.groups: tuple[str, ...] = surfaces.groups if work.keep_groups else ("all",)
+        self._geometry = Geometry(mi, surfaces)
+        spectra = SpectraTable()
+        self._weights = self._spectral_weights()
+        importance = dict(work.group_importance)
+        self._materials = MaterialTable(mi, spectra, surfaces.materials)
+        self._lights = LightSet(
+            mi,
+            spectra,
+            surfaces,
+            work.scene.lights,
+            centre_m=np.asarray(work.camera.camera_to_world[:3, 3]),
+            weights=self._weights,
+            group_weights=np.array([importance.get(name, 1.0) for name in surfaces.groups]),
+            scene_radius_m=_radius_m(self._geometry),
+        )
+        self._loop = PathLoop(
+            mi,
+            self._geometry,
+            self._materials,
+            self._lights,
+            wavelengths=work.wavelengths,
+            channels=len(work.responses),
+            groups=len(self.groups),
+            bands=work.keep_bands,
+        )
+        self._camera = CameraRays(mi, work.camera)
+        self._tables = self._geometry.tables | self._device_tables(spectra)
+        self.rows, self.cols = work.camera.film.rows, work.camera.film.cols
+        pixels, bands = self.rows * self.cols, work.grid.count
+        self._seeds = _lane_seeds(work.seed, pixels)
+        self._offsets = _band_offsets(work.seed, pixels, bands)
+        self.counts = np.zeros(pixels, dtype=np.int64)
+        """Samples of each replica of each pixel."""
+        self._sums = np.zeros((REPLICAS, len(self.groups), len(work.responses), pixels))
+        self._band_sums = np.zeros((pixels, len(self.groups), bands), dtype=np.float64) if work.keep_bands else None
+        self.bad_samples = 0
+        self.segments = 0
+        self.cpu_s = 0.0
+
+    # What is there ---------------------------------------------------------------------------------------------------
+
+    @property
+    def pixels(self) -> int:
+        """Number of film samples."""
+        return self.rows * self.cols
+
+    @property
+    def samples(self) -> int:
+        """Number of paths traced so far."""
+        return REPLICAS * int(self.counts.sum())
+
+    def replicas(self) -> NDArray[np.float32]:
+        """Return the replicas' means, (replicas, groups, channels, rows, cols) [e- s^-1 m^-2 sr^-1]."""
+        means = self._sums / np.maximum(self.counts, 1)
+        return means.reshape(*means.shape[:3], self.rows, self.cols).astype(np.float32)
+
+    def bands(self) -> NDArray[np.float32] | None:
+        """Return the band means, (groups, rows, cols, bands) [photons s^-1 m^-2 sr^-1 nm^-1]; None where not kept."""
+        if self._band_sums is None:
+            return None
+        cube = np.empty((len(self.groups), self.rows, self.cols, self._work.grid.count), dtype=np.float32)
+        flat = cube.reshape(len(self.groups), self.pixels, -1)
+        for first in range(0, self.pixels, 1 << 15):
+            part = slice(first, min(self.pixels, first + (1 << 15)))
+            factor = self._band_factors(part)
+            for group in range(len(self.groups)):
+                flat[group, part] = self._band_sums[part, group] * factor
+        return cube
+
+    def check(self) -> None:
+        """Raise RenderError where too many samples were no numbers, or where the light exceeds single precision."""
+        if self.bad_samples > _MAX_BAD_FRACTION * max(1, self.samples):
+            raise RenderError(
+                f"{self.bad_samples} of {self.samples} samples are NaN, infinite or negative; check the scene for extreme "
+                "radiances, sizes or material parameters."
+            )
+        largest = np.finfo(np.float32).max * max(1, int(self.counts.max()))
+        if not np.all(self._sums <= largest) or (self._band_sums is not None and not np.all(self._band_sums <= largest)):
+            raise RenderError("the radiance exceeds what single precision holds; scale the lights down.")
+
+    # More of it ------------------------------------------------------------------------------------------------------
+
+    def add(self, pixels: NDArray[np.int64], counts: NDArray[np.int64], report: Callable[[float], None]) -> None:
+        """Take `counts` more samples in each replica of each of the `pixels`; `report` gets the finished fraction."""
+        cpu_started = time.process_time()
+        keep = counts > 0
+        pixels, counts = pixels[keep], counts[keep]
+        # Equal counts side by side: lanes of a vector that have nothing left to do wait for the others.
+        order = np.argsort(counts, kind="stable")
+        pixels, counts = pixels[order], counts[order]
+        total, done, first = int(counts.sum()), 0, 0
+        while first < len(pixels):
+            most = max(1, min(_LANES // REPLICAS, _SAMPLES_PER_LAUNCH // (REPLICAS * int(counts[first]))))
+            part = slice(first, min(len(pixels), first + most))
+            self._launch(pixels[part], counts[part])
+            done += int(counts[part].sum())
+            first = part.stop
+            self.cpu_s += time.process_time() - cpu_started
+            cpu_started = time.process_time()
+            report(done / total)
+
+    def _launch(self, pixels: NDArray[np.int64], counts: NDArray[np.int64]) -> None:
+        import drjit as dr  # noqa: PLC0415
+
+        mi = self._mi
+
+        def by_lane(values: NDArray[Any]) -> Any:
+            return upload(mi.UInt32, np.repeat(values, REPLICAS).astype(np.uint32))
+
+        replica = np.tile(np.arange(REPLICAS, dtype=np.int64), len(pixels))
+        launch = Launch(
+            pixel=by_lane(pixels),
+            seed=upload(mi.UInt32, self._seeds[np.repeat(pixels, REPLICAS), replica]),
+            first=by_lane(self.counts[pixels]),
+            count=by_lane(counts),
+            offset=upload(mi.UInt32, self._offsets[np.repeat(pixels, REPLICAS), replica]),
+        )
+        sums = self._loop.trace(self._geometry.scene, self._camera, self._tables, launch)
+        dr.eval(sums.channels, sums.bands, sums.bad, sums.segments)
+        shape = (len(pixels), REPLICAS)
+        for group, channels in enumerate(sums.channels):
+            for channel, values in enumerate(channels):
+                found = np.asarray(values.numpy(), dtype=np.float64).reshape(shape)
+                self._sums[:, group, channel, pixels] += found.T
+        if self._band_sums is not None and sums.bands is not None:
+            found = np.asarray(sums.bands.numpy()).reshape(*shape, len(self.groups), -1)
+            self._band_sums[pixels] += found.sum(axis=1, dtype=np.float64)
+        self.bad_samples += int(np.sum(sums.bad.numpy()))
+        self.segments += int(np.sum(sums.segments.numpy(), dtype=np.int64))
+        self.counts[pixels] += counts
+
+    # Tables ----------------------------------------------------------------------------------------------------------
+
+    def _spectral_weights(self) -> NDArray[np.float64]:
+        """Return (cells,) how much light of a wavelength counts: the summed channel responses within the bands' range."""
+        centres = cell_centres_nm()
+        edges = self._work.grid.edges_nm
+        inside = (centres > edges[0]) & (centres < edges[-1])
+        if not self._work.responses or self._work.keep_bands:
+            return np.where(inside, centres, 0.0)
+        responses = np.stack([cell_means(response) for response in self._work.responses]).astype(np.float64)
+        # Each channel counts by its own noise: a weak one as much as a strong one.
+        peaks = responses.max(axis=1, keepdims=True)
+        shares = np.divide(responses, peaks, out=np.zeros_like(responses), where=peaks > 0)
+        return np.where(inside, shares.sum(axis=0) * centres, 0.0)
+
+    def _device_tables(self, spectra: SpectraTable) -> dict[str, Any]:
+        import drjit as dr  # noqa: PLC0415
+
+        mi, work = self._mi, self._work
+        slots, density = self._slots(spectra)
+        width_nm = work.grid.step_nm * work.grid.count
+        centres = cell_centres_nm()
+        edges = work.grid.edges_nm
+        inside = (centres > edges[0]) & (centres < edges[-1])
+        responses = np.zeros((max(1, len(work.responses)), CELL_COUNT))
+        # The integral over wavelength is the mean of value / density over the path's wavelengths.
+        sparse_nm = np.divide(CELL_NM, density, out=np.zeros(CELL_COUNT), where=density > 0)
+        spread_nm = np.full(CELL_COUNT, width_nm) if work.keep_bands else sparse_nm
+        for number, response in enumerate(work.responses):
+            per_energy = cell_means(response) * centres * _PHOTONS_PER_J_NM * inside
+            responses[number] = per_energy * spread_nm / work.wavelengths
+        return {
+            "spectra": spectra.finish(mi),
+            "responses": upload(mi.Float, responses.astype(np.float32)),
+            "slots": upload(mi.UInt32, slots),
+            "columns": dr.opaque(mi.UInt32, work.camera.film.cols),
+            "max_depth": dr.opaque(mi.UInt32, work.max_depth),
+            "band_count": dr.opaque(mi.UInt32, work.grid.count),
+            "band_count_host": work.grid.count,
+            "band_first_nm": dr.opaque(mi.Float, float(edges[0])),
+            "band_step_nm": dr.opaque(mi.Float, float(work.grid.step_nm)),
+            "band_shifts": [dr.opaque(mi.UInt32, shift) for shift in self._band_shifts()],
+            "photons_per_j_nm": dr.opaque(mi.Float, _PHOTONS_PER_J_NM),
+        }
+
+    def _slots(self, spectra: SpectraTable) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
+        """Return (SLOTS,) cells that equal shares of the wavelengths fall into, and (cells,) probabilities.
+
+        Wavelengths are drawn where the lamps shine and the channels see, plus an even share over all that may count.
+        """
+        light = self._lights.spectrum_share
+        wanted = self._weights * (light if np.any(light * self._weights > 0) else 1.0)
+        possible = self._weights > 0
+        if not possible.any():
+            possible = np.ones(CELL_COUNT, dtype=bool)
+        total = wanted.sum()
+        shares = possible / possible.sum()
+        if total > 0:
+            shares = _UNIFORM_SHARE * shares + (1 - _UNIFORM_SHARE) * wanted / total
+        counts = _whole_shares(shares, SLOTS)
+        return np.repeat(np.arange(CELL_COUNT, dtype=np.uint32), counts), counts / SLOTS
+
+    def _band_shifts(self) -> list[int]:
+        count, wavelengths = self._work.grid.count, self._work.wavelengths
+        return [k * count // wavelengths for k in range(wavelengths)]
+
+    def _band_factors(self, part: slice) -> NDArray[np.float64]:
+        """Return (pixels, bands) factors from sums to band means.
+
+        Where every band of a pixel has a sample, 1/count. Otherwise the expected count: right on average over pixels, since
+        the offsets are uniform, at the price of empty bands.
+        """
+        bands = self._work.grid.count
+        samples = self.counts[part]
+        band = np.arange(bands, dtype=np.int64)
+        counts = np.zeros((len(samples), bands), dtype=np.int64)
+        for replica in range(REPLICAS):
+            for shift in self._band_shifts():
+                start = (self._offsets[part, replica].astype(np.int64) + shift) % bands
+                counts += (samples // bands)[:, None] + ((band - start[:, None]) % bands < (samples % bands)[:, None])
+        expected = np.maximum(REPLICAS * samples * self._work.wavelengths, 1) / bands
+        complete = counts.min(axis=1) > 0
+        return np.where(complete[:, None], 1.0 / np.maximum(counts, 1), 1.0 / expected[:, None])
+
+
+def _whole_shares(shares: NDArray[np.float64], total: int) -> NDArray[np.int64]:
+    """Return whole numbers in proportion to `shares` that sum to `total`, at least 1 where a share is positive."""
+    counts = np.where(shares > 0, np.maximum(1, np.floor(shares * total)), 0).astype(np.int64)
+    excess = int(counts.sum()) - total
+    while excess > 0:  # the floor of 1 gave too many: the largest give some back
+        largest = np.argsort(-counts, kind="stable")[:excess]
+        largest = largest[counts[largest] > 1]
+        counts[largest] -= 1
+        excess -= len(largest)
+    if excess < 0:
+        order = np.argsort(-(shares * total - np.floor(shares * total)) * (shares > 0), kind="stable")
+        order = order[shares[order] > 0]
+        np.add.at(counts, order[np.arange(-excess) % len(order)], 1)
+    return counts
+
+
+def _lane_seeds(seed: int, pixels: int) -> NDArray[np.uint32]:
+    generator = np.random.Generator(np.random.Philox(key=seed32(seed, "lanes")))
+    return generator.integers(0, 1 << 32, size=(pixels, REPLICAS), dtype=np.uint32)
+
+
+def _band_offsets(seed: int, pixels: int, bands: int) -> NDArray[np.uint32]:
+    """Return (pixels, replicas) starting bands, so that neighbours do not favour the same ones."""
+    generator = np.random.Generator(np.random.Philox(key=seed32(seed, "bands")))
+    first = generator.integers(0, bands, size=pixels, dtype=np.uint32)
+    return np.asarray((first[:, None] + np.arange(REPLICAS) * bands // REPLICAS) % bands, dtype=np.uint32)
+
+
+def _radius_m(geometry: Geometry) -> float:
+    """Return the distance from the camera that no surface exceeds [m]."""
+    bounds = geometry.scene.bbox()
+    if not bounds.valid():
+        return 1.0
+    corner = np.maximum(np.abs(np.array(bounds.min).ravel()), np.abs(np.array(bounds.max).ravel()))
+    return float(np.linalg.norm(corner))
