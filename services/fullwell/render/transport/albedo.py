@@ -1,0 +1,152 @@
+"""Directional albedos of rough surfaces, by quadrature: what their single scattering returns of the light from one direction.
+
+A row is a table over the cosine of incidence, mu, at equal steps of the root of mu: dense towards grazing incidence, where
+the albedo of nearly smooth surfaces changes fastest.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from fullwell.render.transport.fresnel import dielectric_on_host
+from fullwell.render.transport.microfacet import POLISHED_BELOW
+
+__all__ = ["NODE_COUNT", "coat_transmittance", "glass_albedo", "hemisphere_mean", "metal_albedo", "mitsuba_internal"]
+
+NODE_COUNT = 256
+
+_KNOT_COUNT = 48
+_ALPHA_COUNT = 48
+_LOG_RANGE = -np.log(POLISHED_BELOW)
+_SMALLEST_MU = 1e-5
+
+_Row = NDArray[np.float64]
+
+
+def metal_albedo(alpha: float) -> _Row:
+    """Return (NODE_COUNT,) the albedo of a rough surface whose facets reflect everything."""
+    return _between_alphas(_metal_knots, alpha)
+
+
+def coat_transmittance(alpha: float, index: float) -> _Row:
+    """Return (NODE_COUNT,) what a rough coat of relative `index` does not reflect at once."""
+    if alpha < POLISHED_BELOW:
+        return np.asarray(1.0 - dielectric_on_host(_nodes(), index)[0])
+    return 1.0 - _between_alphas(functools.partial(_coat_knots, index), alpha)
+
+
+def glass_albedo(alpha: float, index: float) -> _Row:
+    """Return (NODE_COUNT,) reflected plus refracted light where the far side has the relative `index`."""
+    return _between_alphas(functools.partial(_glass_knots, index), alpha)
+
+
+def hemisphere_mean(row: _Row) -> float:
+    """Return the mean of a row over the hemisphere, weighted by the cosine, as the device interpolates it."""
+    # Between nodes the row is linear in x, mu = x^2, so that 2 mu dmu = 4 x^3 dx: three Gauss points are exact.
+    nodes, weights = _unit_gauss(3)
+    x = (np.arange(NODE_COUNT - 1)[:, None] + nodes) / (NODE_COUNT - 1)
+    value = row[:-1, None] * (1.0 - nodes) + row[1:, None] * nodes
+    return float(np.sum(4.0 * x**3 * value * weights) / (NODE_COUNT - 1))
+
+
+@functools.lru_cache(maxsize=4096)
+def mitsuba_internal(alpha: float, index: float) -> float:
+    """Return the diffuse reflectance of a rough coat from below as Mitsuba's `roughplastic` computes it: a mean of 64 nodes."""
+    mu = np.maximum(1e-6, np.linspace(0.0, 1.0, 64))
+    return float(2.0 * np.mean(_reflected(mu, alpha, 1.0 / index, 128, 64) * mu))
+
+
+def _nodes() -> _Row:
+    """Return the cosines at which a row's values stand."""
+    return np.asarray(np.linspace(0.0, 1.0, NODE_COUNT) ** 2)
+
+
+def _knots() -> _Row:
+    """Return the cosines at which albedos are integrated: their cube roots have equal steps."""
+    return np.maximum(np.linspace(0.0, 1.0, _KNOT_COUNT) ** 3, _SMALLEST_MU)
+
+
+def _between_alphas(knots: Callable[[int], _Row], alpha: float) -> _Row:
+    """Return a row between the alphas whose knots are kept, cubic in log alpha."""
+    position = (_ALPHA_COUNT - 1) * (1.0 + np.log(alpha) / _LOG_RANGE)
+    first = int(np.clip(np.floor(position) - 1, 0, _ALPHA_COUNT - 4))
+    t = position - first
+    weights = [np.prod([(t - j) / (i - j) for j in range(4) if j != i]) for i in range(4)]
+    rows = sum(w * knots(first + i) for i, w in enumerate(weights) if w != 0.0)
+    spline = CubicSpline(np.linspace(0.0, 1.0, _KNOT_COUNT), rows)
+    return np.asarray(np.clip(spline(np.cbrt(_nodes())), 0.0, 1.0))
+
+
+def _alpha(number: int) -> float:
+    return float(np.exp(_LOG_RANGE * (number / (_ALPHA_COUNT - 1) - 1.0)))
+
+
+@functools.lru_cache(maxsize=4096)
+def _metal_knots(number: int) -> _Row:
+    return _reflected(_knots(), _alpha(number), None, 64, 48)
+
+
+@functools.lru_cache(maxsize=4096)
+def _coat_knots(index: float, number: int) -> _Row:
+    return _reflected(_knots(), _alpha(number), index, 32, 24)
+
+
+@functools.lru_cache(maxsize=4096)
+def _glass_knots(index: float, number: int) -> _Row:
+    alpha = _alpha(number)
+    points = (48, 32) if index > 1.0 else (128, 96)
+    cosine, reflected, refracted, weight = _visible(_knots(), alpha, index, *points)
+    fresnel = dielectric_on_host(cosine, index)[0]
+    light = np.where(reflected > 0, fresnel * _masking(reflected, alpha), 0.0)
+    light += np.where(refracted < 0, (1.0 - fresnel) * _masking(refracted, alpha), 0.0)
+    return np.asarray(np.einsum("ijk,jk->i", light, weight))
+
+
+def _reflected(mu: _Row, alpha: float, index: float | None, polar: int, azimuthal: int) -> _Row:
+    cosine, reflected, _, weight = _visible(mu, alpha, index or 1.0, polar, azimuthal)
+    fresnel = 1.0 if index is None else dielectric_on_host(cosine, index)[0]
+    return np.asarray(np.einsum("ijk,jk->i", np.where(reflected > 0, fresnel * _masking(reflected, alpha), 0.0), weight))
+
+
+def _visible(mu: _Row, alpha: float, index: float, polar: int, azimuthal: int) -> tuple[_Row, _Row, _Row, _Row]:
+    """Return quadrature over the normals that are visible from each mu (see `microfacet.visible_normal`).
+
+    These are the cosine to the normal, the z of the reflected and of the refracted direction, all (mu, polar, azimuthal), and
+    the weights (polar, azimuthal), which add up to 1.
+    """
+    (u, u_weight), (v, v_weight) = _towards_one(polar), _unit_gauss(azimuthal)
+    mu, u = mu[:, None, None], u[None, :, None]
+    azimuth = np.pi * v[None, None, :]
+    sine = np.sqrt(np.maximum(0.0, 1.0 - mu * mu))
+    length = np.hypot(alpha * sine, mu)
+    side, up = alpha * sine / length, mu / length
+    z = (1.0 - u) * (1.0 + up) - up
+    radius = np.sqrt(np.maximum(0.0, u * (1.0 + up) * (1.0 + z)))
+    x, y, z = alpha * (radius * np.cos(azimuth) + side), alpha * radius * np.sin(azimuth), (1.0 - u) * (1.0 + up)
+    length = np.sqrt(x * x + y * y + z * z)
+    x, z = x / length, z / length
+    cosine = x * sine + z * mu
+    refracted = z * (cosine / index - dielectric_on_host(cosine, index)[1]) - mu / index
+    return cosine, 2.0 * cosine * z - mu, refracted, u_weight[:, None] * v_weight[None, :]
+
+
+@functools.cache
+def _unit_gauss(count: int) -> tuple[_Row, _Row]:
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    return 0.5 * (nodes + 1.0), 0.5 * weights
+
+
+def _towards_one(count: int) -> tuple[_Row, _Row]:
+    """Return Gauss points that crowd at 1, where the steep microfacets are whose light is masked or reflected totally."""
+    nodes, weights = _unit_gauss(count)
+    return 1.0 - (1.0 - nodes) ** 2, 2.0 * (1.0 - nodes) * weights
+
+
+def _masking(z: _Row, alpha: float) -> _Row:
+    z_2 = z * z
+    return np.asarray(2.0 / (1.0 + np.sqrt(1.0 + alpha**2 * (1.0 - z_2) / np.maximum(z_2, 1e-30))))

@@ -1,0 +1,546 @@
+"""Materials as tables: one scattering function for all, whose parameters each hit gathers by its material's number.
+
+Every opaque material is the same surface: a diffuse base under a clear coat, and a metal, mixed by `metallic`; both share one
+microfacet lobe, and all that scatters widely is sampled as one cosine lobe. A diffuse surface is a coat of index 1. Glass is
+the other kind. What light single scattering at the microfacets loses is given back; see docs/physics/materials.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fullwell.radiometry.spectrum import Spectrum
+from fullwell.render.transport import fresnel
+from fullwell.render.transport.albedo import (
+    NODE_COUNT,
+    coat_transmittance,
+    glass_albedo,
+    hemisphere_mean,
+    metal_albedo,
+    mitsuba_internal,
+)
+from fullwell.render.transport.microfacet import (
+    POLISHED_BELOW,
+    density,
+    masking,
+    masking_per_cosine,
+    visible_normal,
+)
+from fullwell.render.transport.textures import TextureAtlas, sigmoid, texel_of
+from fullwell.render.transport.wavelengths import CELL_NM, FIRST_EDGE_NM, SpectraTable, cell_means, look_up
+from fullwell.scene import Conductor, Dielectric, Diffuse, Material, Mirror, Principled, RoughPlastic, Texture
+
+__all__ = ["BsdfSample", "MaterialTable", "Surface"]
+
+_TINTED, _GLASS, _TEXTURED, _DISPERSIVE = 1, 2, 4, 8
+
+_INDEX_STEP = 1e-3
+"""Relative step of the index below which rough glass is polished: it bends light by less than single precision can follow."""
+
+
+@dataclass(slots=True)
+class _Record:
+    """One material's numbers, as the device gathers them: `_NUMBERS` in single precision, `_ROWS` as whole numbers."""
+
+    alpha: float = 1.0
+    metallic: float = 0.0
+    coat_index: float = 1.0
+    inner_reflectance: float = 0.0
+    coat_mean: float = 1.0
+    metal_mean: float = 1.0
+    glass_index: float = 1.0
+    exterior_index: float = 1.0
+    flags: int = 0
+    colour: int = SpectraTable.BLACK
+    eta: int = SpectraTable.BLACK
+    k: int = SpectraTable.BLACK
+    coat_row: int = 0
+    metal_row: int = 0
+    glass_row: int = 0
+    texture_offset: int = 0
+    texture_rows: int = 1
+    texture_cols: int = 1
+
+
+_NUMBERS = (
+    "alpha",
+    "metallic",
+    "coat_index",
+    "inner_reflectance",
+    "coat_mean",
+    "metal_mean",
+    "glass_index",
+    "exterior_index",
+)
+_ROWS = (
+    "flags",
+    "colour",
+    "eta",
+    "k",
+    "coat_row",
+    "metal_row",
+    "glass_row",
+    "texture_offset",
+    "texture_rows",
+    "texture_cols",
+)
+
+
+class _AlbedoRows:
+    """Collects albedo rows; row 0 is 1 everywhere, which compensates nothing."""
+
+    def __init__(self) -> None:
+        self._rows = [np.ones(NODE_COUNT)]
+        self._known: dict[tuple[Any, ...], int] = {}
+
+    def add(self, make: Callable[..., NDArray[np.float64]], *parameters: float) -> int:
+        key = (make, *parameters)
+        if key not in self._known:
+            self._known[key] = len(self._rows)
+            self._rows.append(make(*parameters))
+        return self._known[key]
+
+    def mean(self, number: int) -> float:
+        return hemisphere_mean(self._rows[number])
+
+    def values(self) -> NDArray[np.float32]:
+        return np.concatenate(self._rows).astype(np.float32)
+
+
+class MaterialTable:
+    """The materials of a scene on the device.
+
+    Attributes
+    ----------
+    features
+        Which code the materials need, of "texture", "plastic", "metal", "glass", "rough_glass" and "dispersion". Kernels of
+        equal features are the same, whatever the materials.
+    """
+
+    features: frozenset[str]
+
+    def __init__(self, mi: Any, spectra: SpectraTable, materials: Sequence[Material], *, compensate: bool = True) -> None:
+        """Add the materials' spectra to `spectra` and upload the rest.
+
+        `compensate=False` leaves the light lost that single scattering loses, as Mitsuba's rough materials do.
+        """
+        self._mi = mi
+        self._spectra, self._albedos, self._atlas = spectra, _AlbedoRows(), TextureAtlas()
+        self._compensate = compensate
+        self._found: set[str] = set()
+        records = [self._record(material) for material in materials] or [_Record()]
+        self.features = frozenset(self._found)
+        self._numbers = mi.Float(np.array([[getattr(r, n) for n in _NUMBERS] for r in records], dtype=np.float32).ravel())
+        self._rows = mi.UInt32(np.array([[getattr(r, n) for n in _ROWS] for r in records], dtype=np.uint32).ravel())
+        self._albedo = mi.Float(self._albedos.values())
+        if "texture" in self.features:
+            self._texels, self._palette = self._atlas.finish(mi)
+
+    # On the host -----------------------------------------------------------------------------------------------------
+
+    def _record(self, material: Material) -> _Record:
+        record = _Record()
+        match material:
+            case Diffuse(reflectance=reflectance):
+                self._colour(record, reflectance)
+            case RoughPlastic():
+                self._colour(record, material.reflectance)
+                self._coat(record, material.roughness, material.interior_index)
+            case Principled():
+                self._principled(record, material)
+            case Conductor():
+                self._conductor(record, material)
+            case Mirror(reflectance=reflectance):
+                self._colour(record, reflectance)
+                record.flags |= _TINTED
+                self._metal(record, 0.0, 1.0)
+            case Dielectric():
+                self._glass(record, material)
+        return record
+
+    def _colour(self, record: _Record, colour: Spectrum | Texture) -> None:
+        if isinstance(colour, Spectrum):
+            record.colour = self._spectra.add(colour)
+            return
+        placed = self._atlas.add(colour)
+        record.flags |= _TEXTURED
+        record.texture_offset, record.texture_rows, record.texture_cols = placed.offset, placed.rows, placed.cols
+        self._found.add("texture")
+
+    def _coat(self, record: _Record, roughness: float, index: float) -> None:
+        alpha, index = float(roughness), float(index)
+        record.alpha, record.coat_index = alpha, index
+        if index == 1.0:
+            return
+        record.coat_row = self._albedos.add(coat_transmittance, alpha, index)
+        record.coat_mean = self._albedos.mean(record.coat_row)
+        # Reciprocity: what a surface lets out of diffuse light from below is what it lets in from above over index^2.
+        record.inner_reflectance = 1.0 - record.coat_mean / index**2
+        if not self._compensate:
+            record.inner_reflectance = mitsuba_internal(max(alpha, POLISHED_BELOW), index)
+        self._found.add("plastic")
+
+    def _metal(self, record: _Record, roughness: float, share: float) -> None:
+        record.alpha, record.metallic = float(roughness), float(share)
+        if self._compensate and record.alpha >= POLISHED_BELOW:
+            record.metal_row = self._albedos.add(metal_albedo, record.alpha)
+            record.metal_mean = self._albedos.mean(record.metal_row)
+        self._found.add("metal")
+
+    def _principled(self, record: _Record, material: Principled) -> None:
+        self._colour(record, material.base_color)
+        alpha, metallic = float(material.roughness) ** 2, min(1.0, max(0.0, float(material.metallic)))
+        if metallic < 1.0:
+            # specular 0.5 is the 4 % of an index of 1.5: F0 = 0.08 * specular.
+            amplitude = np.sqrt(0.08 * float(material.specular))
+            self._coat(record, alpha, max(1.001, (1.0 + amplitude) / (1.0 - amplitude)))
+        if metallic > 0.0:
+            record.flags |= _TINTED
+            self._metal(record, alpha, metallic)
+
+    def _conductor(self, record: _Record, material: Conductor) -> None:
+        record.eta, record.k = self._spectra.add(material.eta), self._spectra.add(material.k)
+        eta, k = (cell_means(spectrum).astype(np.float64) for spectrum in (material.eta, material.k))
+        # The colour of a metal is its mean reflectance: what repeated scattering sees, and how the lobes are chosen.
+        record.colour = self._spectra.add_cells(fresnel.conductor_mean(eta, k).astype(np.float32))
+        self._metal(record, material.roughness, 1.0)
+
+    def _glass(self, record: _Record, material: Dielectric) -> None:
+        record.flags |= _GLASS
+        record.exterior_index = float(material.exterior_index)
+        record.glass_index = float(material.interior_index) / record.exterior_index
+        record.alpha = float(material.roughness)
+        if abs(record.glass_index - 1.0) < _INDEX_STEP:
+            record.alpha = 0.0
+        self._found.add("glass")
+        if record.alpha >= POLISHED_BELOW:
+            self._found.add("rough_glass")
+            if self._compensate:
+                record.glass_row = self._albedos.add(glass_albedo, record.alpha, record.glass_index)
+                inside = self._albedos.add(glass_albedo, record.alpha, 1.0 / record.glass_index)
+                assert inside == record.glass_row + 1
+
+    # On the device ---------------------------------------------------------------------------------------------------
+
+    def at(
+        self,
+        spectra_device: Any,
+        material: Any,
+        uv: Any,
+        cells: list[Any],
+        wavelengths_nm: list[Any],
+        u_texture: Any,
+        active: Any,
+        single: Any = None,
+    ) -> Surface:
+        """Return the surface at hits with the `material` numbers (UInt32).
+
+        Parameters
+        ----------
+        spectra_device
+            The finished table of spectra.
+        uv
+            Texture coordinates.
+        cells, wavelengths_nm
+            The path's wavelengths, W of each.
+        u_texture
+            Uniform in [0, 1): which of four texels is taken.
+        single
+            Whether dispersion has left the path with wavelength 0 alone (see `BsdfSample.single_wavelength`); None: nowhere.
+        """
+        hit = _Gathered(self._mi, self._numbers, self._rows, material, active)
+        surface = Surface(self._mi, self.features, self._albedo, hit, len(cells))
+        surface.colour = look_up(self._mi, spectra_device, hit.row("colour"), cells)
+        if "texture" in self.features:
+            surface.colour = self._textured(hit, surface.colour, uv, wavelengths_nm, u_texture)
+        if "metal" in self.features:
+            surface.eta = look_up(self._mi, spectra_device, hit.row("eta"), cells)
+            surface.k = look_up(self._mi, spectra_device, hit.row("k"), cells)
+        return surface
+
+    def _textured(self, hit: _Gathered, plain: Any, uv: Any, wavelengths_nm: list[Any], u: Any) -> Any:
+        import drjit as dr  # noqa: PLC0415 - the renderer is loaded late
+
+        mi = self._mi
+        has = hit.flag(_TEXTURED) & hit.active
+        texel = hit.row("texture_offset") + texel_of(mi, dr, uv, u, hit.row("texture_rows"), hit.row("texture_cols"))
+        start = dr.gather(mi.UInt32, self._texels, texel, has) * 3
+        coefficients = mi.Vector3f(*(dr.gather(mi.Float, self._palette, start + i, has) for i in range(3)))
+        return dr.select(has, sigmoid(dr, coefficients, wavelengths_nm), plain)
+
+
+class _Gathered:
+    """The records of the materials that were hit."""
+
+    def __init__(self, mi: Any, numbers: Any, rows: Any, material: Any, active: Any) -> None:
+        self._mi, self._numbers, self._rows, self._material = mi, numbers, rows, material
+        self.active = active
+        self._flags = self.row("flags")
+
+    def number(self, name: str) -> Any:
+        import drjit as dr  # noqa: PLC0415 - the renderer is loaded late
+
+        return dr.gather(self._mi.Float, self._numbers, self._material * len(_NUMBERS) + _NUMBERS.index(name), self.active)
+
+    def row(self, name: str) -> Any:
+        import drjit as dr  # noqa: PLC0415 - the renderer is loaded late
+
+        return dr.gather(self._mi.UInt32, self._rows, self._material * len(_ROWS) + _ROWS.index(name), self.active)
+
+    def flag(self, bit: int) -> Any:
+        return (self._flags & bit) != 0
+
+
+@dataclass(slots=True)
+class BsdfSample:
+    """A direction drawn from a surface.
+
+    Attributes
+    ----------
+    wo
+        The direction, in the local frame.
+    weight
+        Scattering function x |cosine| / density, per wavelength; holds (n_i / n_t)^2 where light is refracted.
+    pdf
+        Density of the lobes that have one [sr^-1]; 0 where the direction comes from a delta distribution.
+    delta
+        Whether it does.
+    transmitted
+        Whether the direction lies on the other side.
+    single_wavelength
+        True where dispersion kept only wavelength 0: the weight is then (W w, 0, ..., 0), or (w, 0, ..., 0) where the path had
+        come with a single wavelength already.
+    eta
+        Index behind over index before where the light was refracted, else 1: for Russian roulette.
+    """
+
+    wo: Any
+    weight: Any
+    pdf: Any
+    delta: Any
+    transmitted: Any
+    single_wavelength: Any
+    eta: Any
+
+
+class Surface:
+    """The material of one hit: lives within one step of a path."""
+
+    colour: Any
+    eta: Any
+    k: Any
+
+    def __init__(self, mi: Any, features: frozenset[str], albedo: Any, hit: _Gathered, count: int) -> None:
+        import drjit as dr  # noqa: PLC0415 - the renderer is loaded late
+
+        self._mi, self._dr, self._features, self._albedo, self._count = mi, dr, features, albedo, count
+        self._plastic, self._metal, self._glass = (name in features for name in ("plastic", "metal", "glass"))
+        self._rough_glass = "rough_glass" in features
+        self._lobes = self._plastic or self._metal
+        alpha = hit.number("alpha") if self._lobes or self._glass else mi.Float(1.0)
+        self.polished = alpha < POLISHED_BELOW
+        self._alpha = dr.maximum(alpha, POLISHED_BELOW)
+        self.is_glass = hit.flag(_GLASS) if self._glass else mi.Bool(False)
+        if self._plastic:
+            self._coat_index, self._inner, self._coat_mean = (
+                hit.number(name) for name in ("coat_index", "inner_reflectance", "coat_mean")
+            )
+            self._coat_row = hit.row("coat_row") * NODE_COUNT
+        if self._metal:
+            self._metallic, self._metal_mean = hit.number("metallic"), hit.number("metal_mean")
+            self._metal_row = hit.row("metal_row") * NODE_COUNT
+            self._tinted = hit.flag(_TINTED)
+        if self._glass:
+            self._glass_index = hit.number("glass_index")
+        if self._rough_glass:
+            self._glass_row = hit.row("glass_row") * NODE_COUNT
+
+    @property
+    def has_smooth(self) -> Any:
+        """Whether `evaluate` can be other than zero: there is more than delta distributions."""
+        only_delta = self._mi.Bool(False)
+        if self._metal:
+            only_delta |= self._metallic >= 1.0
+        if self._glass:
+            only_delta |= self.is_glass
+        return ~(only_delta & self.polished)
+
+    def evaluate(self, wi: Any, wo: Any) -> tuple[Any, Any]:
+        """Return the scattering function x |cosine|, per wavelength, and the density [sr^-1], of all but delta distributions."""
+        wi_up, wo_up = self._upright(wi, wi), self._upright(wo, wi)
+        value, pdf = self._opaque(wi_up, wo_up)
+        if self._glass:
+            value, pdf = self._dr.select(self.is_glass, 0.0, value), self._dr.select(self.is_glass, 0.0, pdf)
+        if self._rough_glass:
+            rough = self.is_glass & ~self.polished
+            glass_value, glass_pdf = self._evaluate_glass(wi_up, wo_up, wi.z > 0)
+            value = self._dr.select(rough, glass_value, value)
+            pdf = self._dr.select(rough, glass_pdf, pdf)
+        return value, pdf
+
+    def sample(self, wi: Any, u_lobe: Any, u: Any) -> BsdfSample:
+        """Return a direction for the light that leaves along `wi`."""
+        mi, dr = self._mi, self._dr
+        up = self._upright(wi, wi)
+        wo = mi.warp.square_to_cosine_hemisphere(u)
+        normal = delta = None
+        if self._lobes or self._rough_glass:
+            normal = visible_normal(mi, dr, up, self._alpha, u)
+        if self._lobes:
+            share = self._facet_share(up.z)
+            at_facet = u_lobe < share
+            delta = at_facet & self.polished
+            facet = dr.select(self.polished, mi.Vector3f(0, 0, 1), normal)
+            wo = dr.select(at_facet, 2.0 * dr.dot(up, facet) * facet - up, wo)
+        weight, pdf = self._opaque(up, wo)
+        weight = dr.select(pdf > 0, weight / dr.maximum(pdf, 1e-30), 0.0)
+        if self._lobes:
+            mirrored = self._facet_reflectance(up.z) / dr.maximum(share, 1e-30)
+            weight, pdf = dr.select(delta, mirrored, weight), dr.select(delta, 0.0, pdf)
+        drawn = BsdfSample(
+            wo, weight, pdf, mi.Bool(False) if delta is None else delta, mi.Bool(False), mi.Bool(False), mi.Float(1.0)
+        )
+        if self._glass:
+            drawn = self._with_glass(drawn, up, wi.z > 0, u_lobe, normal)
+        drawn.wo = self._upright(drawn.wo, wi)
+        return drawn
+
+    def _upright(self, direction: Any, wi: Any) -> Any:
+        """Return the direction mirrored so that `wi` is above the surface: it is its own inverse."""
+        return self._mi.Vector3f(direction.x, direction.y, self._dr.mulsign(direction.z, wi.z))
+
+    # Opaque surfaces -------------------------------------------------------------------------------------------------
+
+    def _opaque(self, wi: Any, wo: Any) -> tuple[Any, Any]:
+        dr = self._dr
+        above = (wi.z > 0) & (wo.z > 0)
+        cosine = dr.maximum(wo.z, 0.0) / np.pi
+        value, pdf = self._base(wi.z, wo.z) * cosine, cosine
+        if self._lobes:
+            half = dr.normalize(wi + wo)
+            facets = 0.25 * density(dr, half, self._alpha) * masking_per_cosine(dr, wi, self._alpha)
+            facets = dr.select(self.polished, 0.0, facets)
+            share = self._facet_share(wi.z)
+            reflectance = self._facet_reflectance(dr.minimum(dr.dot(wi, half), 1.0))
+            value = value + reflectance * (facets * masking(dr, wo, self._alpha))
+            pdf = dr.lerp(pdf, facets, share)
+        return dr.select(above, value, 0.0), dr.select(above, pdf, 0.0)
+
+    def _base(self, mu_i: Any, mu_o: Any) -> Any:
+        """Return pi times the scattering function of all that scatters widely."""
+        base = self._body()
+        if self._plastic:
+            base = base * (self._coat(mu_i) * self._coat(mu_o) / self._dr.square(self._coat_index))
+        if self._metal:
+            scale = (1.0 - self._albedo_at(self._metal_row, mu_i)) * (1.0 - self._albedo_at(self._metal_row, mu_o))
+            repeated = self._repeated() * (scale / self._dr.maximum(1.0 - self._metal_mean, 1e-7))
+            base = self._dr.lerp(base, repeated, self._metallic)
+        return base
+
+    def _body(self) -> Any:
+        """Return the light a coated body sends up again inside, of the light that has entered."""
+        return self.colour / (1.0 - self.colour * self._inner) if self._plastic else self.colour
+
+    def _repeated(self) -> Any:
+        """Return what a metal reflects of the light that its facets scatter more than once (kulla2017)."""
+        colour, mean = self.colour, self._metal_mean
+        return self._dr.square(colour) * mean / (1.0 - colour * (1.0 - mean))
+
+    def _facet_reflectance(self, cosine: Any) -> Any:
+        dr = self._dr
+        reflectance: Any = dr.llvm.ad.ArrayXf([self._mi.Float(0.0)] * self._count)
+        if self._plastic:
+            reflectance = reflectance + fresnel.dielectric(dr, cosine, self._coat_index)[0]
+        if self._metal:
+            metal = dr.select(self._tinted, self.colour, fresnel.conductor(dr, cosine, self.eta, self.k))
+            reflectance = dr.lerp(reflectance, metal, self._metallic)
+        return reflectance
+
+    def _facet_share(self, mu: Any) -> Any:
+        """Return the probability of the microfacet lobe: its share of the albedo, by the mean over the wavelengths."""
+        dr = self._dr
+        wide = dr.mean(self._body(), axis=0)
+        narrow: Any = self._mi.Float(0.0)
+        if self._plastic:
+            entering = self._coat(mu)
+            wide = wide * (entering * self._coat_mean / dr.square(self._coat_index))
+            narrow = 1.0 - entering
+        if self._metal:
+            albedo = self._albedo_at(self._metal_row, mu)
+            wide = dr.lerp(wide, (1.0 - albedo) * dr.mean(self._repeated(), axis=0), self._metallic)
+            narrow = dr.lerp(narrow, albedo * dr.mean(self.colour, axis=0), self._metallic)
+        return dr.select(narrow > 0, narrow / dr.maximum(narrow + wide, 1e-20), 0.0)
+
+    def _coat(self, mu: Any) -> Any:
+        return self._albedo_at(self._coat_row, mu)
+
+    def _albedo_at(self, start: Any, mu: Any) -> Any:
+        mi, dr = self._mi, self._dr
+        x = dr.sqrt(dr.clip(mu, 0.0, 1.0)) * (NODE_COUNT - 1)
+        index = dr.minimum(mi.UInt32(x), NODE_COUNT - 2)
+        low, high = (dr.gather(mi.Float, self._albedo, start + index + i) for i in (0, 1))
+        return dr.lerp(low, high, x - mi.Float(index))
+
+    # Glass -----------------------------------------------------------------------------------------------------------
+
+    def _relative_index(self, outside: Any) -> Any:
+        return self._dr.select(outside, self._glass_index, self._dr.rcp(self._glass_index))
+
+    def _lost_at_glass(self, mu: Any, outside: Any) -> Any:
+        start = self._glass_row + self._dr.select(outside, 0, NODE_COUNT)
+        return self._dr.rcp(self._dr.maximum(self._albedo_at(start, mu), 1e-4))
+
+    def _with_glass(self, opaque: BsdfSample, wi: Any, outside: Any, u_lobe: Any, normal: Any) -> BsdfSample:
+        """Return the sample with that of glass where the material is glass."""
+        mi, dr = self._mi, self._dr
+        facet = mi.Vector3f(0, 0, 1)
+        if self._rough_glass:
+            facet = dr.select(self.polished, facet, normal)
+        index = self._relative_index(outside)
+        cosine = dr.clip(dr.dot(wi, facet), 0.0, 1.0)
+        reflectance, refracted = fresnel.dielectric(dr, cosine, index)
+        reflected = u_lobe < reflectance
+        straight = 2.0 * cosine * facet - wi
+        bent = (cosine / index - refracted) * facet - wi / index
+        wo = dr.select(reflected, straight, bent)
+        weight: Any = dr.select(reflected, 1.0, dr.rcp(dr.square(index)))
+        pdf: Any = mi.Float(0.0)
+        if self._rough_glass:
+            kept = masking(dr, wo, self._alpha) * self._lost_at_glass(wi.z, outside)
+            right_side = (wo.z > 0) == reflected
+            weight = weight * dr.select(self.polished, 1.0, dr.select(right_side, kept, 0.0))
+            pdf = self._evaluate_glass(wi, wo, outside)[1]
+            pdf = dr.select(self.polished | ~right_side, 0.0, pdf)
+        glass = self.is_glass
+        return BsdfSample(
+            wo=dr.select(glass, wo, opaque.wo),
+            weight=dr.select(glass, weight, opaque.weight),
+            pdf=dr.select(glass, pdf, opaque.pdf),
+            delta=dr.select(glass, self.polished, opaque.delta),
+            transmitted=glass & ~reflected,
+            single_wavelength=mi.Bool(False),
+            eta=dr.select(glass & ~reflected, index, 1.0),
+        )
+
+    def _evaluate_glass(self, wi: Any, wo: Any, outside: Any) -> tuple[Any, Any]:
+        dr = self._dr
+        index = self._relative_index(outside)
+        reflected = wo.z > 0
+        scale = dr.select(reflected, 1.0, index)
+        half = dr.normalize(wi + scale * wo)
+        half = dr.mulsign(half, half.z)
+        inward, outward = dr.dot(wi, half), dr.dot(wo, half)
+        valid = (wi.z > 0) & (inward > 0) & (outward * wo.z > 0)
+        reflectance = fresnel.dielectric(dr, dr.clip(inward, 0.0, 1.0), index)[0]
+        facets = density(dr, half, self._alpha) * masking_per_cosine(dr, wi, self._alpha)
+        stretch = dr.square(index) * dr.abs(outward) * inward / dr.maximum(dr.square(inward + index * outward), 1e-20)
+        pdf = facets * dr.select(reflected, 0.25 * reflectance, (1.0 - reflectance) * stretch)
+        pdf = dr.select(valid, pdf, 0.0)
+        value = pdf * masking(dr, wo, self._alpha) * self._lost_at_glass(wi.z, outside)
+        value = value * dr.select(reflected, 1.0, dr.rcp(dr.square(index)))
+        return dr.llvm.ad.ArrayXf([value] * self._count), pdf
