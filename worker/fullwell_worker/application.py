@@ -28,7 +28,7 @@ from fullwell.jobs.queue import RENDER_TASK, CeleryTaskQueue, TaskQueue, celery_
 from fullwell.jobs.repository import JobRepository
 from fullwell.storage import store_from_url
 from fullwell_worker import health
-from fullwell_worker.execution import CurrentJob, WorkerContext, run_frames
+from fullwell_worker.execution import CurrentJob, WorkerContext, run_frames, runner_of
 from fullwell_worker.loss import Loss, record_loss_in_a_process
 from fullwell_worker.watchdog import Watchdog
 
@@ -92,13 +92,13 @@ class _Processes:
         if self._context is None or self._pid != os.getpid():
             repository = JobRepository(Database(self.settings.database))
             store = store_from_url(self.settings.store)
-            self._context = WorkerContext(self.name, self.settings, repository, store, CurrentJob())
+            self._context = WorkerContext(self.name, self.settings, repository, store, CurrentJob(), runner_of(self.settings))
             self._pid = os.getpid()
         return self._context
 
 
 class QueueWorker:
-    """One worker: its main process, which never renders, and its one child, which does."""
+    """One worker: its main process, its one child, which takes frames, and that one's render process, which makes them."""
 
     def __init__(self, settings: Settings, *, broker_url: str, name: str = "") -> None:
         self._label = name or "worker"

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TypeVar
 
 import structlog
 
@@ -22,16 +22,16 @@ from fullwell.core import (
     ServiceError,
     ShapeError,
 )
-from fullwell.core.settings import Settings, load_settings
+from fullwell.core.settings import Settings
 from fullwell.jobs.processes import current_process
 from fullwell.jobs.records import Lease, RetryRule
 from fullwell.jobs.repository import JobRepository
-from fullwell.schema import RecipeBuilder, RecipeDocument, load_recipe
+from fullwell.schema import RecipeDocument, load_recipe
 from fullwell.storage import ObjectStore
+from fullwell_worker.isolation import IsolatedRunner
+from fullwell_worker.limits import limits_of
 from fullwell_worker.materials import JobFolder
-
-if TYPE_CHECKING:
-    from fullwell.pipeline import StageStore
+from fullwell_worker.runners import FrameRunner, PipelineRunner, Progress
 
 __all__ = [
     "CurrentJob",
@@ -40,8 +40,8 @@ __all__ = [
     "PipelineRunner",
     "WorkerContext",
     "frame_prefix",
-    "frame_runner",
     "run_frames",
+    "runner_of",
 ]
 
 T = TypeVar("T")
@@ -52,80 +52,9 @@ PERMANENT = (FieldError, ShapeError, AssetError)
 log = structlog.get_logger("fullwell.worker")
 
 
-class Progress(Protocol):
-    """Where a frame is; the pipeline's FrameProgress is one."""
-
-    @property
-    def stage(self) -> str:
-        """What is being done."""
-
-    @property
-    def fraction(self) -> float:
-        """How much of the frame is finished, in [0, 1]."""
-
-
-class FrameRunner(Protocol):
-    """What renders a frame and publishes its products, the manifest last."""
-
-    def __call__(
-        self,
-        document: RecipeDocument,
-        index: int,
-        store: ObjectStore,
-        prefix: str,
-        *,
-        base_dir: Path | None,
-        progress: Callable[[Progress], None] | None,
-        should_cancel: Callable[[], bool] | None,
-    ) -> Any:
-        """Return when the frame's manifest is in the store."""
-        ...
-
-
-class PipelineRunner:
-    """Runs frames with the real pipeline; keeps what builds the frames of the job at hand, with the models it has read.
-
-    Radiance images go to the stage cache in the store that holds the products: all workers of a service share it.
-    """
-
-    def __init__(self) -> None:
-        self._document: RecipeDocument | None = None
-        self._builder: RecipeBuilder | None = None
-        self._stages: StageStore | None = None
-
-    def __call__(
-        self,
-        document: RecipeDocument,
-        index: int,
-        store: ObjectStore,
-        prefix: str,
-        *,
-        base_dir: Path | None,
-        progress: Callable[[Progress], None] | None,
-        should_cancel: Callable[[], bool] | None,
-    ) -> Any:
-        """Return the manifest of the published frame."""
-        from fullwell.pipeline import StageStore, run_frame  # noqa: PLC0415 - loads the renderer: in the child, at its first frame
-
-        if self._stages is None or self._stages.store is not store:
-            limit = load_settings().cache_bytes
-            self._stages = StageStore(store, max_bytes=limit) if limit else None
-        if self._builder is None or self._document is not document:
-            self._document, self._builder = document, RecipeBuilder(document, base_dir=base_dir)
-        return run_frame(
-            document,
-            index,
-            store,
-            prefix,
-            builder=self._builder,
-            stages=self._stages,
-            progress=progress,
-            should_cancel=should_cancel,
-        )
-
-
-frame_runner: FrameRunner = PipelineRunner()
-"""What runs a frame; tests of the service put a stand-in here."""
+def runner_of(settings: Settings) -> FrameRunner:
+    """Return what runs frames: in a process of its own, or in this one where the settings say so."""
+    return IsolatedRunner(settings.store, limits_of(settings)) if settings.isolate else PipelineRunner()
 
 
 def frame_prefix(job_id: str, number: int) -> str:
@@ -160,6 +89,7 @@ class WorkerContext:
     repository: JobRepository
     store: ObjectStore
     job: CurrentJob
+    runner: FrameRunner
 
     @property
     def rule(self) -> RetryRule:
@@ -242,7 +172,7 @@ def _run_leased(context: WorkerContext, lease: Lease) -> None:
         document, base_dir = context.job.load(lease.job_id, repository, context.store)
         prefix = frame_prefix(lease.job_id, lease.number)
         try:
-            frame_runner(
+            context.runner(
                 document,
                 lease.number,
                 context.store,

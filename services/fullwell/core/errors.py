@@ -14,6 +14,9 @@ __all__ = [
     "FullwellError",
     "NotFoundError",
     "RenderError",
+    "RenderMemoryError",
+    "RenderProcessError",
+    "RenderTimeError",
     "ServiceError",
     "ShapeError",
     "StorageError",
@@ -75,6 +78,24 @@ class RenderError(FullwellError):
     """The renderer could not make the image."""
 
     code = "render_failed"
+
+
+class RenderProcessError(RenderError):
+    """The process that rendered the frame ended without an answer, by a signal for example."""
+
+    code = "render_process_died"
+
+
+class RenderMemoryError(RenderProcessError):
+    """The frame needed more memory than a render process may have."""
+
+    code = "out_of_memory"
+
+
+class RenderTimeError(RenderProcessError):
+    """The frame took longer than a frame may."""
+
+    code = "time_limit"
 
 
 class StorageError(FullwellError):

@@ -56,6 +56,10 @@ class Settings(BaseSettings):
     retry_delay_s: float = Field(default=2.0, ge=0.0, le=3600.0)
     frame_time_limit_s: float = Field(default=3000.0, ge=1.0)
 
+    isolate: bool = True
+    render_memory_bytes: int = Field(default=0, ge=0)
+    render_max_frames: int = Field(default=50, ge=1)
+
     queue: str = Field(default="fullwell", pattern=r"^[A-Za-z0-9_.-]{1,64}$")
     visibility_timeout_s: int = Field(default=3600, ge=10)
     soft_shutdown_s: float = Field(default=20.0, ge=0.0)
@@ -81,6 +85,15 @@ class Settings(BaseSettings):
     def _long_keys(cls, value: tuple[SecretStr, ...]) -> tuple[SecretStr, ...]:
         if any(len(key.get_secret_value()) < 8 for key in value):
             raise ValueError("an API key must have at least 8 characters")
+        return value
+
+    @field_validator("render_memory_bytes", mode="after")
+    @classmethod
+    def _room_for_the_renderer(cls, value: int) -> int:
+        if 0 < value < 512 * MIB:
+            raise ValueError(
+                "must be 0 (nine tenths of the memory) or at least 512 MiB (536870912): the renderer alone needs 300"
+            )
         return value
 
     @model_validator(mode="after")

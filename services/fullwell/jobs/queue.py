@@ -18,6 +18,8 @@ PRIORITY_STEPS: Final = (0, 3, 6, 9)
 PRIORITY_SEPARATOR: Final = ":"
 MAX_CHUNK: Final = 16
 MESSAGES_PER_JOB: Final = 256
+LIMIT_MARGIN_S: Final = 60.0
+"""The worker ends a frame that takes too long itself, and says so; Celery's limit lies behind that, for a worker that hangs."""
 
 
 class TaskQueue(Protocol):
@@ -103,7 +105,7 @@ class CeleryTaskQueue:
                         priority=priority,
                         producer=producer,
                         retry=False,
-                        time_limit=self._settings.frame_time_limit_s * len(chunk),
+                        time_limit=(self._settings.frame_time_limit_s + LIMIT_MARGIN_S) * len(chunk),
                         ignore_result=True,
                     )
         except Exception as error:  # kombu raises the errors of whatever transport is configured

@@ -1,0 +1,90 @@
+"""What renders a frame: the interface that the worker knows, and the real pipeline behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from fullwell.core.settings import load_settings
+
+if TYPE_CHECKING:
+    from fullwell.pipeline import StageStore
+    from fullwell.schema import RecipeBuilder, RecipeDocument
+    from fullwell.storage import ObjectStore
+
+__all__ = ["FrameRunner", "PipelineRunner", "Progress"]
+
+
+class Progress(Protocol):
+    """Where a frame is; the pipeline's FrameProgress is one."""
+
+    @property
+    def stage(self) -> str:
+        """What is being done."""
+
+    @property
+    def fraction(self) -> float:
+        """How much of the frame is finished, in [0, 1]."""
+
+
+class FrameRunner(Protocol):
+    """What renders a frame and publishes its products, the manifest last."""
+
+    def __call__(
+        self,
+        document: RecipeDocument,
+        index: int,
+        store: ObjectStore,
+        prefix: str,
+        *,
+        base_dir: Path | None,
+        progress: Callable[[Progress], None] | None,
+        should_cancel: Callable[[], bool] | None,
+    ) -> Any:
+        """Return when the frame's manifest is in the store."""
+        ...
+
+
+class PipelineRunner:
+    """Runs frames with the real pipeline; keeps what builds the frames of the job at hand, with the models it has read.
+
+    Radiance images go to the stage cache in the store that holds the products: all workers of a service share it.
+    """
+
+    def __init__(self) -> None:
+        self._document: RecipeDocument | None = None
+        self._builder: RecipeBuilder | None = None
+        self._stages: StageStore | None = None
+
+    def __call__(
+        self,
+        document: RecipeDocument,
+        index: int,
+        store: ObjectStore,
+        prefix: str,
+        *,
+        base_dir: Path | None,
+        progress: Callable[[Progress], None] | None,
+        should_cancel: Callable[[], bool] | None,
+    ) -> Any:
+        """Return the manifest of the published frame."""
+        # Loads the renderer: in the process that renders, at its first frame.
+        from fullwell.pipeline import StageStore, run_frame  # noqa: PLC0415
+        from fullwell.schema import RecipeBuilder  # noqa: PLC0415
+
+        if self._stages is None or self._stages.store is not store:
+            limit = load_settings().cache_bytes
+            self._stages = StageStore(store, max_bytes=limit) if limit else None
+        if self._builder is None or self._document is not document:
+            self._document, self._builder = document, RecipeBuilder(document, base_dir=base_dir)
+        return run_frame(
+            document,
+            index,
+            store,
+            prefix,
+            builder=self._builder,
+            stages=self._stages,
+            progress=progress,
+            should_cancel=should_cancel,
+        )
