@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fullwell.core.errors import FieldError, FullwellError, RenderError
+from fullwell.radiometry.glasses import index_of_line
 from fullwell.radiometry.spectrum import Spectrum
 from fullwell.render.conditioning import (
     check_glass_thickness,
@@ -222,14 +223,15 @@ def _bsdf(mi: Any, material: Material) -> dict[str, Any]:
             return _two_sided(
                 {"type": "conductor", "material": "none", "specular_reflectance": _spectrum(material.reflectance)}
             )
-        case Dielectric():
+        case Dielectric(interior_index=inside):
+            interior_index = index_of_line(inside) if isinstance(inside, Spectrum) else inside
             glass: dict[str, Any] = {
                 "type": "dielectric",
-                "int_ior": material.interior_index,
+                "int_ior": interior_index,
                 "ext_ior": material.exterior_index,
             }
             # Without a step of the index there is nothing to scatter at, and the renderer's rough model refuses it.
-            if material.roughness >= _MIN_ALPHA and material.interior_index != material.exterior_index:
+            if material.roughness >= _MIN_ALPHA and interior_index != material.exterior_index:
                 glass |= {"type": "roughdielectric", "alpha": float(material.roughness), "distribution": "ggx"}
             return glass
 

@@ -139,9 +139,9 @@ class Conductor:
 
 @dataclass(frozen=True, slots=True)
 class Dielectric:
-    """Clear refracting body; roughness 0 is polished."""
+    """Clear refracting body; roughness 0 is polished. An index that is a spectrum bends each wavelength its own way."""
 
-    interior_index: float = 1.5046
+    interior_index: float | Spectrum = 1.5046
     exterior_index: float = 1.000277
     roughness: float = 0.0
 

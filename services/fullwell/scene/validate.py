@@ -311,7 +311,9 @@ def _material(material: Material, where: _Place) -> None:
                 _between(float(table.values.min()), 0, math.inf, where, f"material.{name}")
             _between(material.roughness, 0, 1, where, "material.roughness")
         case Dielectric():
-            _between(material.interior_index, *_INDEX_RANGE, where, "material.interior_index")
+            inside = material.interior_index
+            for value in (inside.values.min(), inside.values.max()) if isinstance(inside, Spectrum) else (inside,):
+                _between(value, *_INDEX_RANGE, where, "material.interior_index")
             _between(material.exterior_index, *_INDEX_RANGE, where, "material.exterior_index")
             _between(material.roughness, 0, 1, where, "material.roughness")
 

@@ -24,6 +24,7 @@ _KNOT_COUNT = 48
 _ALPHA_COUNT = 48
 _LOG_RANGE = -np.log(POLISHED_BELOW)
 _SMALLEST_MU = 1e-5
+_ROUGH = 0.2
 
 _Row = NDArray[np.float64]
 
@@ -40,9 +41,16 @@ def coat_transmittance(alpha: float, index: float) -> _Row:
     return 1.0 - _between_alphas(functools.partial(_coat_knots, index), alpha)
 
 
+@functools.lru_cache(maxsize=4096)
 def glass_albedo(alpha: float, index: float) -> _Row:
     """Return (NODE_COUNT,) reflected plus refracted light where the far side has the relative `index`."""
-    return _between_alphas(functools.partial(_glass_knots, index), alpha)
+    # From inside, total reflection begins with an infinite slope, which costs points where the surface is rough.
+    points = (48, 32) if index > 1.0 else (160, 112) if alpha > _ROUGH else (128, 48)
+    cosine, reflected, refracted, weight = _visible(_knots(), alpha, index, points)
+    fresnel = dielectric_on_host(cosine, index)[0]
+    light = np.where(reflected > 0, fresnel * _masking(reflected, alpha), 0.0)
+    light += np.where(refracted < 0, (1.0 - fresnel) * _masking(refracted, alpha), 0.0)
+    return _as_row(np.einsum("ijk,jk->i", light, weight))
 
 
 def hemisphere_mean(row: _Row) -> float:
@@ -58,7 +66,7 @@ def hemisphere_mean(row: _Row) -> float:
 def mitsuba_internal(alpha: float, index: float) -> float:
     """Return the diffuse reflectance of a rough coat from below as Mitsuba's `roughplastic` computes it: a mean of 64 nodes."""
     mu = np.maximum(1e-6, np.linspace(0.0, 1.0, 64))
-    return float(2.0 * np.mean(_reflected(mu, alpha, 1.0 / index, 128, 64) * mu))
+    return float(2.0 * np.mean(_reflected(mu, alpha, 1.0 / index, (128, 64)) * mu))
 
 
 def _nodes() -> _Row:
@@ -78,7 +86,11 @@ def _between_alphas(knots: Callable[[int], _Row], alpha: float) -> _Row:
     t = position - first
     weights = [np.prod([(t - j) / (i - j) for j in range(4) if j != i]) for i in range(4)]
     rows = sum(w * knots(first + i) for i, w in enumerate(weights) if w != 0.0)
-    spline = CubicSpline(np.linspace(0.0, 1.0, _KNOT_COUNT), rows)
+    return _as_row(np.asarray(rows))
+
+
+def _as_row(at_knots: _Row) -> _Row:
+    spline = CubicSpline(np.linspace(0.0, 1.0, _KNOT_COUNT), at_knots)
     return np.asarray(np.clip(spline(np.cbrt(_nodes())), 0.0, 1.0))
 
 
@@ -88,38 +100,27 @@ def _alpha(number: int) -> float:
 
 @functools.lru_cache(maxsize=4096)
 def _metal_knots(number: int) -> _Row:
-    return _reflected(_knots(), _alpha(number), None, 64, 48)
+    return _reflected(_knots(), _alpha(number), None, (96, 32))
 
 
 @functools.lru_cache(maxsize=4096)
 def _coat_knots(index: float, number: int) -> _Row:
-    return _reflected(_knots(), _alpha(number), index, 32, 24)
+    return _reflected(_knots(), _alpha(number), index, (32, 24))
 
 
-@functools.lru_cache(maxsize=4096)
-def _glass_knots(index: float, number: int) -> _Row:
-    alpha = _alpha(number)
-    points = (48, 32) if index > 1.0 else (128, 96)
-    cosine, reflected, refracted, weight = _visible(_knots(), alpha, index, *points)
-    fresnel = dielectric_on_host(cosine, index)[0]
-    light = np.where(reflected > 0, fresnel * _masking(reflected, alpha), 0.0)
-    light += np.where(refracted < 0, (1.0 - fresnel) * _masking(refracted, alpha), 0.0)
-    return np.asarray(np.einsum("ijk,jk->i", light, weight))
-
-
-def _reflected(mu: _Row, alpha: float, index: float | None, polar: int, azimuthal: int) -> _Row:
-    cosine, reflected, _, weight = _visible(mu, alpha, index or 1.0, polar, azimuthal)
+def _reflected(mu: _Row, alpha: float, index: float | None, points: tuple[int, int]) -> _Row:
+    cosine, reflected, _, weight = _visible(mu, alpha, index or 1.0, points)
     fresnel = 1.0 if index is None else dielectric_on_host(cosine, index)[0]
     return np.asarray(np.einsum("ijk,jk->i", np.where(reflected > 0, fresnel * _masking(reflected, alpha), 0.0), weight))
 
 
-def _visible(mu: _Row, alpha: float, index: float, polar: int, azimuthal: int) -> tuple[_Row, _Row, _Row, _Row]:
+def _visible(mu: _Row, alpha: float, index: float, points: tuple[int, int]) -> tuple[_Row, _Row, _Row, _Row]:
     """Return quadrature over the normals that are visible from each mu (see `microfacet.visible_normal`).
 
     These are the cosine to the normal, the z of the reflected and of the refracted direction, all (mu, polar, azimuthal), and
     the weights (polar, azimuthal), which add up to 1.
     """
-    (u, u_weight), (v, v_weight) = _towards_one(polar), _unit_gauss(azimuthal)
+    (u, u_weight), (v, v_weight) = _towards_one(points[0]), _unit_gauss(points[1])
     mu, u = mu[:, None, None], u[None, :, None]
     azimuth = np.pi * v[None, None, :]
     sine = np.sqrt(np.maximum(0.0, 1.0 - mu * mu))

@@ -48,12 +48,7 @@ def conductor(dr: Any, cosine: Any, eta: Any, k: Any) -> Any:
     sine_2 = 1.0 - cosine_2
     difference = dr.square(eta) - dr.square(k) - sine_2
     modulus = dr.sqrt(dr.square(difference) + 4.0 * dr.square(eta * k))
-    real = dr.safe_sqrt(0.5 * (modulus + difference))
-    return _conductor(dr, cosine, cosine_2, sine_2, modulus, real)
-
-
-def _conductor(dr: Any, cosine: Any, cosine_2: Any, sine_2: Any, modulus: Any, real: Any) -> Any:
-    across = 2.0 * cosine * real
+    across = 2.0 * cosine * dr.safe_sqrt(0.5 * (modulus + difference))
     normal = (modulus + cosine_2 - across) / dr.maximum(modulus + cosine_2 + across, _TINY)
     wide, narrow = modulus * cosine_2 + dr.square(sine_2), across * sine_2
     parallel = normal * (wide - narrow) / dr.maximum(wide + narrow, _TINY)

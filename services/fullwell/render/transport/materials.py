@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fullwell.radiometry.glasses import index_of_line
 from fullwell.radiometry.spectrum import Spectrum
 from fullwell.render.transport import fresnel
 from fullwell.render.transport.albedo import (
@@ -32,7 +33,7 @@ from fullwell.render.transport.microfacet import (
     visible_normal,
 )
 from fullwell.render.transport.textures import TextureAtlas, sigmoid, texel_of
-from fullwell.render.transport.wavelengths import CELL_NM, FIRST_EDGE_NM, SpectraTable, cell_means, look_up
+from fullwell.render.transport.wavelengths import SpectraTable, cell_means, look_up
 from fullwell.scene import Conductor, Dielectric, Diffuse, Material, Mirror, Principled, RoughPlastic, Texture
 
 __all__ = ["BsdfSample", "MaterialTable", "Surface"]
@@ -59,9 +60,11 @@ class _Record:
     colour: int = SpectraTable.BLACK
     eta: int = SpectraTable.BLACK
     k: int = SpectraTable.BLACK
+    index: int = SpectraTable.BLACK
     coat_row: int = 0
     metal_row: int = 0
     glass_row: int = 0
+    inside_row: int = 0
     texture_offset: int = 0
     texture_rows: int = 1
     texture_cols: int = 1
@@ -82,9 +85,11 @@ _ROWS = (
     "colour",
     "eta",
     "k",
+    "index",
     "coat_row",
     "metal_row",
     "glass_row",
+    "inside_row",
     "texture_offset",
     "texture_rows",
     "texture_cols",
@@ -213,7 +218,14 @@ class MaterialTable:
     def _glass(self, record: _Record, material: Dielectric) -> None:
         record.flags |= _GLASS
         record.exterior_index = float(material.exterior_index)
-        record.glass_index = float(material.interior_index) / record.exterior_index
+        inside = material.interior_index
+        if isinstance(inside, Spectrum):
+            if np.ptp(cell_means(inside)) > 0.0:
+                record.flags |= _DISPERSIVE
+                record.index = self._spectra.add(inside)
+                self._found.add("dispersion")
+            inside = index_of_line(inside)
+        record.glass_index = float(inside) / record.exterior_index
         record.alpha = float(material.roughness)
         if abs(record.glass_index - 1.0) < _INDEX_STEP:
             record.alpha = 0.0
@@ -222,12 +234,11 @@ class MaterialTable:
             self._found.add("rough_glass")
             if self._compensate:
                 record.glass_row = self._albedos.add(glass_albedo, record.alpha, record.glass_index)
-                inside = self._albedos.add(glass_albedo, record.alpha, 1.0 / record.glass_index)
-                assert inside == record.glass_row + 1
+                record.inside_row = self._albedos.add(glass_albedo, record.alpha, 1.0 / record.glass_index)
 
     # On the device ---------------------------------------------------------------------------------------------------
 
-    def at(
+    def at(  # noqa: PLR0917 - one hit in one call
         self,
         spectra_device: Any,
         material: Any,
@@ -261,6 +272,9 @@ class MaterialTable:
         if "metal" in self.features:
             surface.eta = look_up(self._mi, spectra_device, hit.row("eta"), cells)
             surface.k = look_up(self._mi, spectra_device, hit.row("k"), cells)
+        if "dispersion" in self.features:
+            indices = look_up(self._mi, spectra_device, hit.row("index"), cells)
+            surface.disperse(hit.flag(_DISPERSIVE), indices / hit.number("exterior_index"), single)
         return surface
 
     def _textured(self, hit: _Gathered, plain: Any, uv: Any, wavelengths_nm: list[Any], u: Any) -> Any:
@@ -268,7 +282,7 @@ class MaterialTable:
 
         mi = self._mi
         has = hit.flag(_TEXTURED) & hit.active
-        texel = hit.row("texture_offset") + texel_of(mi, dr, uv, u, hit.row("texture_rows"), hit.row("texture_cols"))
+        texel = hit.row("texture_offset") + texel_of(mi, dr, uv, u, rows=hit.row("texture_rows"), cols=hit.row("texture_cols"))
         start = dr.gather(mi.UInt32, self._texels, texel, has) * 3
         coefficients = mi.Vector3f(*(dr.gather(mi.Float, self._palette, start + i, has) for i in range(3)))
         return dr.select(has, sigmoid(dr, coefficients, wavelengths_nm), plain)
@@ -338,7 +352,9 @@ class Surface:
     def __init__(self, mi: Any, features: frozenset[str], albedo: Any, hit: _Gathered, count: int) -> None:
         import drjit as dr  # noqa: PLC0415 - the renderer is loaded late
 
-        self._mi, self._dr, self._features, self._albedo, self._count = mi, dr, features, albedo, count
+        self._mi: Any = mi
+        self._dr: Any = dr
+        self._albedo, self._count = albedo, count
         self._plastic, self._metal, self._glass = (name in features for name in ("plastic", "metal", "glass"))
         self._rough_glass = "rough_glass" in features
         self._lobes = self._plastic or self._metal
@@ -356,9 +372,18 @@ class Surface:
             self._metal_row = hit.row("metal_row") * NODE_COUNT
             self._tinted = hit.flag(_TINTED)
         if self._glass:
-            self._glass_index = hit.number("glass_index")
+            self._glass_index: Any = hit.number("glass_index")
+            self._dispersive: Any = None
         if self._rough_glass:
-            self._glass_row = hit.row("glass_row") * NODE_COUNT
+            self._glass_rows = [hit.row(name) * NODE_COUNT for name in ("glass_row", "inside_row")]
+
+    def disperse(self, dispersive: Any, indices: Any, single: Any) -> None:
+        """Give glass that is `dispersive` an index for each wavelength; `single` as in `MaterialTable.at`."""
+        mi, dr = self._mi, self._dr
+        self._dispersive = self.is_glass & dispersive
+        self._glass_index = dr.select(self._dispersive, indices, self._glass_index)
+        alone = mi.Float(self._count) if single is None else dr.select(single, 1.0, float(self._count))
+        self._first_only = dr.llvm.ad.ArrayXf([alone] + [mi.Float(0.0)] * (self._count - 1))
 
     @property
     def has_smooth(self) -> Any:
@@ -371,7 +396,7 @@ class Surface:
         return ~(only_delta & self.polished)
 
     def evaluate(self, wi: Any, wo: Any) -> tuple[Any, Any]:
-        """Return the scattering function x |cosine|, per wavelength, and the density [sr^-1], of all but delta distributions."""
+        """Return the scattering function x |cosine|, per wavelength, and the density [sr^-1]: of all but delta lobes."""
         wi_up, wo_up = self._upright(wi, wi), self._upright(wo, wi)
         value, pdf = self._opaque(wi_up, wo_up)
         if self._glass:
@@ -406,7 +431,7 @@ class Surface:
             wo, weight, pdf, mi.Bool(False) if delta is None else delta, mi.Bool(False), mi.Bool(False), mi.Float(1.0)
         )
         if self._glass:
-            drawn = self._with_glass(drawn, up, wi.z > 0, u_lobe, normal)
+            drawn = self._with_glass(drawn, up, wi.z > 0, u_lobe=u_lobe, normal=normal)
         drawn.wo = self._upright(drawn.wo, wi)
         return drawn
 
@@ -488,20 +513,31 @@ class Surface:
 
     # Glass -----------------------------------------------------------------------------------------------------------
 
-    def _relative_index(self, outside: Any) -> Any:
-        return self._dr.select(outside, self._glass_index, self._dr.rcp(self._glass_index))
+    def _indices(self, outside: Any) -> tuple[Any, Any]:
+        """Return the index of the far side relative to this one: of the first wavelength, and of all that differ from it."""
+        dr = self._dr
+        index = dr.select(outside, self._glass_index, dr.rcp(self._glass_index))
+        return (index, None) if self._dispersive is None else (index[0], index)
 
-    def _lost_at_glass(self, mu: Any, outside: Any) -> Any:
-        start = self._glass_row + self._dr.select(outside, 0, NODE_COUNT)
+    def _regained(self, mu: Any, outside: Any) -> Any:
+        start = self._dr.select(outside, *self._glass_rows)
         return self._dr.rcp(self._dr.maximum(self._albedo_at(start, mu), 1e-4))
 
-    def _with_glass(self, opaque: BsdfSample, wi: Any, outside: Any, u_lobe: Any, normal: Any) -> BsdfSample:
+    def _per_wavelength(self, cosine: Any, reflectance: Any, indices: Any, reflected: Any) -> Any:
+        """Return what a lobe of the first wavelength weighs at each: other indices reflect another share, and refract away."""
+        if indices is None:
+            return 1.0
+        dr = self._dr
+        shares = fresnel.dielectric(dr, cosine, indices)[0] / dr.maximum(reflectance, 1e-20)
+        return dr.select(self._dispersive, dr.select(reflected, shares, self._first_only), 1.0)
+
+    def _with_glass(self, opaque: BsdfSample, wi: Any, outside: Any, *, u_lobe: Any, normal: Any) -> BsdfSample:
         """Return the sample with that of glass where the material is glass."""
         mi, dr = self._mi, self._dr
         facet = mi.Vector3f(0, 0, 1)
         if self._rough_glass:
             facet = dr.select(self.polished, facet, normal)
-        index = self._relative_index(outside)
+        index, indices = self._indices(outside)
         cosine = dr.clip(dr.dot(wi, facet), 0.0, 1.0)
         reflectance, refracted = fresnel.dielectric(dr, cosine, index)
         reflected = u_lobe < reflectance
@@ -511,36 +547,38 @@ class Surface:
         weight: Any = dr.select(reflected, 1.0, dr.rcp(dr.square(index)))
         pdf: Any = mi.Float(0.0)
         if self._rough_glass:
-            kept = masking(dr, wo, self._alpha) * self._lost_at_glass(wi.z, outside)
+            kept = masking(dr, wo, self._alpha) * self._regained(wi.z, outside)
             right_side = (wo.z > 0) == reflected
             weight = weight * dr.select(self.polished, 1.0, dr.select(right_side, kept, 0.0))
             pdf = self._evaluate_glass(wi, wo, outside)[1]
             pdf = dr.select(self.polished | ~right_side, 0.0, pdf)
-        glass = self.is_glass
+        weight = weight * self._per_wavelength(cosine, reflectance, indices, reflected)
+        glass, through = self.is_glass, self.is_glass & ~reflected
         return BsdfSample(
             wo=dr.select(glass, wo, opaque.wo),
             weight=dr.select(glass, weight, opaque.weight),
             pdf=dr.select(glass, pdf, opaque.pdf),
             delta=dr.select(glass, self.polished, opaque.delta),
-            transmitted=glass & ~reflected,
-            single_wavelength=mi.Bool(False),
-            eta=dr.select(glass & ~reflected, index, 1.0),
+            transmitted=through,
+            single_wavelength=mi.Bool(False) if self._dispersive is None else through & self._dispersive,
+            eta=dr.select(through, index, 1.0),
         )
 
     def _evaluate_glass(self, wi: Any, wo: Any, outside: Any) -> tuple[Any, Any]:
         dr = self._dr
-        index = self._relative_index(outside)
+        index, indices = self._indices(outside)
         reflected = wo.z > 0
-        scale = dr.select(reflected, 1.0, index)
-        half = dr.normalize(wi + scale * wo)
+        half = dr.normalize(wi + dr.select(reflected, 1.0, index) * wo)
         half = dr.mulsign(half, half.z)
         inward, outward = dr.dot(wi, half), dr.dot(wo, half)
+        cosine = dr.clip(inward, 0.0, 1.0)
         valid = (wi.z > 0) & (inward > 0) & (outward * wo.z > 0)
-        reflectance = fresnel.dielectric(dr, dr.clip(inward, 0.0, 1.0), index)[0]
+        reflectance = fresnel.dielectric(dr, cosine, index)[0]
         facets = density(dr, half, self._alpha) * masking_per_cosine(dr, wi, self._alpha)
         stretch = dr.square(index) * dr.abs(outward) * inward / dr.maximum(dr.square(inward + index * outward), 1e-20)
         pdf = facets * dr.select(reflected, 0.25 * reflectance, (1.0 - reflectance) * stretch)
         pdf = dr.select(valid, pdf, 0.0)
-        value = pdf * masking(dr, wo, self._alpha) * self._lost_at_glass(wi.z, outside)
+        value = pdf * masking(dr, wo, self._alpha) * self._regained(wi.z, outside)
         value = value * dr.select(reflected, 1.0, dr.rcp(dr.square(index)))
-        return dr.llvm.ad.ArrayXf([value] * self._count), pdf
+        value = value * self._per_wavelength(cosine, reflectance, indices, reflected)
+        return dr.llvm.ad.ArrayXf([value] * self._count) if indices is None else value, pdf

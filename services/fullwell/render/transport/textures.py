@@ -47,7 +47,7 @@ class TextureAtlas:
         if known is None:
             rows, cols = texture.pixels.shape[:2]
             pixels = texture.pixels.astype(np.uint32).reshape(-1, 3)
-            self._packed.append(pixels[:, 0] << 16 | pixels[:, 1] << 8 | pixels[:, 2])
+            self._packed.append(np.asarray(pixels[:, 0] << 16 | pixels[:, 1] << 8 | pixels[:, 2], dtype=np.uint32))
             known = (texture, Placed(self._count, rows, cols))
             self._count += rows * cols
             self._placed[id(texture)] = known
@@ -117,7 +117,7 @@ def _model() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return scale, table.reshape(3, size, size, size, 3)
 
 
-def texel_of(mi: Any, dr: Any, uv: Any, u: Any, rows: Any, cols: Any) -> Any:
+def texel_of(mi: Any, dr: Any, uv: Any, u: Any, *, rows: Any, cols: Any) -> Any:
     """Return one of the four texels about `uv`, chosen with its bilinear weight: the mean is the bilinear value.
 
     Images repeat; row 0 is at v = 1. `u` in [0, 1) is used up.
