@@ -138,6 +138,23 @@ def test_a_frame_fails_with_its_cause_and_can_be_retried(worker: RunningService,
     assert outcomes(client, job.id, 1) == [["failed", "failed"]]
 
 
+def test_a_render_process_that_crashes_costs_its_frame_one_attempt_and_the_worker_nothing(worker: RunningService) -> None:
+    client = worker.client
+    taker = children_of(worker.processes[-1].pid)[0]
+    job = client.submit(distinct(2))
+    wait_for(lambda: any(frame.stage == "render" for frame in client.frames(job.id, state="running")), what="rendering")
+    crashed = next(client.frames(job.id, state="running")).number
+    (renderer,) = children_of(taker)
+    os.kill(renderer, signal.SIGSEGV)
+    ended = client.wait(job.id, timeout_s=60)
+    assert (ended.state, ended.frames.done) == ("done", 2)
+    attempts = client.frame(job.id, crashed).attempts
+    assert [attempt.outcome for attempt in attempts] == ["failed", "done"]
+    assert "the render process died by SIGSEGV (signal 11) in stage 'render'" in (attempts[0].cause or "")
+    assert children_of(worker.processes[-1].pid)[0] == taker
+    assert children_of(taker) not in ([], [renderer])
+
+
 def test_a_recipe_with_a_model_file_runs_from_the_uploaded_copy(worker: RunningService, tmp_path: Path) -> None:
     pytest.importorskip("trimesh")
     (tmp_path / "models").mkdir()

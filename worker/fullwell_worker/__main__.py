@@ -39,6 +39,7 @@ def _run(settings: Settings, name: str) -> int:
     from fullwell.jobs.database import Database  # noqa: PLC0415
     from fullwell.jobs.logs import configure_logs  # noqa: PLC0415
     from fullwell_worker.application import QueueWorker, wait_for_schema  # noqa: PLC0415
+    from fullwell_worker.kernels import bring_kernels  # noqa: PLC0415
     from fullwell_worker.materials import remove_leftovers  # noqa: PLC0415
 
     broker_url, settings = _connected(settings)
@@ -47,6 +48,7 @@ def _run(settings: Settings, name: str) -> int:
     wait_for_schema(database)
     database.close()
     remove_leftovers()
+    bring_kernels(settings.kernels)
     QueueWorker(settings, broker_url=broker_url, name=name).run()
     return 0
 

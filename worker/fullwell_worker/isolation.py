@@ -121,7 +121,8 @@ class IsolatedRunner:
         if isinstance(answer, FrameFinished):
             return answer.manifest
         if isinstance(answer.error, MemoryError):
-            raise memory_error(self._limits, "asked for it", child.frames - 1) from None
+            what = f"was refused more ({str(answer.error)[:100] or 'no more was there'})"
+            raise memory_error(self._limits, what, child.frames - 1) from None
         if not isinstance(answer.error, FullwellError):
             answer.error.add_note(answer.trace)
         raise answer.error

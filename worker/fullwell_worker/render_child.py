@@ -124,13 +124,20 @@ class _Kitchen:
                 should_cancel=lambda: self._desk.is_cancelled(order.serial),
             )
         except Exception as error:
-            return FrameFailed(_portable(error), traceback.format_exc())
+            return FrameFailed(_shortage(error) or _portable(error), traceback.format_exc())
         return FrameFinished(manifest)
 
     def _opened(self, url: str) -> ObjectStore:
         if self._store is None or self._store_url != url:
             self._store, self._store_url = store_from_url(url), url
         return self._store
+
+
+def _shortage(error: BaseException | None) -> MemoryError | None:
+    """Return the lack of memory behind an error, or None: a stage may have wrapped it in an error of its own."""
+    while error is not None and not isinstance(error, MemoryError):
+        error = error.__cause__ or error.__context__
+    return None if error is None else MemoryError(str(error))
 
 
 def _portable(error: Exception) -> Exception:

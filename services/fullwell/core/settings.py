@@ -59,6 +59,7 @@ class Settings(BaseSettings):
     isolate: bool = True
     render_memory_bytes: int = Field(default=0, ge=0)
     render_max_frames: int = Field(default=50, ge=1)
+    kernels: Path | None = None
 
     queue: str = Field(default="fullwell", pattern=r"^[A-Za-z0-9_.-]{1,64}$")
     visibility_timeout_s: int = Field(default=3600, ge=10)

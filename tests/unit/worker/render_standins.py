@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fullwell.core import CancelledError, FieldError, StorageError
+from fullwell.core import CancelledError, FieldError, RenderError, StorageError
 from fullwell.storage import ObjectStore
 
 __all__ = ["Standin"]
@@ -75,6 +75,12 @@ class Standin:
 
     def asks_for_too_much(self, _: Callable[[], bool]) -> None:
         self.kept.append(bytearray(b"x") * (1 << 45))
+
+    def wraps_a_shortage(self, _: Callable[[], bool]) -> None:
+        try:
+            self.asks_for_too_much(_)
+        except MemoryError as error:
+            raise RenderError("the renderer failed") from error
 
     def keeps_much(self, _: Callable[[], bool]) -> None:
         self.kept.append(bytearray(b"x") * (256 * MIB))

@@ -149,10 +149,13 @@ def test_a_frame_that_grows_beyond_the_limit_is_ended(isolated: Callable[..., Is
     assert one.make()["frames"] == 1
 
 
-def test_one_huge_allocation_is_refused_before_it_takes_the_machine_with_it(isolated: Callable[..., Isolated]) -> None:
+@pytest.mark.parametrize("what", ["asks_for_too_much", "wraps_a_shortage"])
+def test_one_huge_allocation_is_refused_before_it_takes_the_machine_with_it(
+    isolated: Callable[..., Isolated], what: str
+) -> None:
     one = isolated()
-    with pytest.raises(RenderMemoryError, match=r"needed more than 4\.00 GiB"):
-        one.make("asks_for_too_much")
+    with pytest.raises(RenderMemoryError, match=r"needed more than 4\.00 GiB.*was refused more"):
+        one.make(what)
     assert one.make()["frames"] == 1
 
 
