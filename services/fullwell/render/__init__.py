@@ -1,7 +1,22 @@
-"""Mitsuba behind one door: radiance images and surface queries. Importing this package does not load the renderer."""
+"""The renderer behind one door: light through a camera, and surface queries. Importing this package does not load Mitsuba."""
 
-from fullwell.render.radiance import RenderStatistics, render_radiance
+from fullwell.render.adaptive import NoiseTarget, SamplingGoal, tile_errors
+from fullwell.render.light import LightRequest, RenderedLight, RenderStatistics, render_light
+from fullwell.render.radiance import render_radiance
 from fullwell.render.surfaces import query_surfaces
 from fullwell.render.variant import VariantChoice, activate, choose_variant
 
-__all__ = ["RenderStatistics", "VariantChoice", "activate", "choose_variant", "query_surfaces", "render_radiance"]
+__all__ = [
+    "LightRequest",
+    "NoiseTarget",
+    "RenderStatistics",
+    "RenderedLight",
+    "SamplingGoal",
+    "VariantChoice",
+    "activate",
+    "choose_variant",
+    "query_surfaces",
+    "render_light",
+    "render_radiance",
+    "tile_errors",
+]

@@ -40,8 +40,8 @@ _AREA_ROUNDING = 1e-4
 """Relative change of a lamp's area that does not matter: a tenth of what the product promises."""
 
 
-def check_reach(scene: SceneDescription, centre_m: NDArray[np.float64]) -> None:
-    """Refuse a camera that is nowhere, and a scene so small that rays skip over its shapes."""
+def check_reach(scene: SceneDescription, centre_m: NDArray[np.float64], *, smallest_m: float = _SMALLEST_REACH_M) -> None:
+    """Refuse a camera that is nowhere, and a scene that reaches less than `smallest_m`: rays skip over its shapes."""
     if not np.all(np.abs(centre_m) <= _FARTHEST_CENTRE_M):
         raise FieldError(
             f"the camera stands at {np.asarray(centre_m).tolist()}; must be finite and within {_FARTHEST_CENTRE_M:g} m of the "
@@ -51,9 +51,9 @@ def check_reach(scene: SceneDescription, centre_m: NDArray[np.float64]) -> None:
     if not scene.objects:
         return
     reach_m = max(_reach_m(part, item.to_world @ part.to_object, centre_m) for item in scene.objects for part in item.parts)
-    if reach_m < _SMALLEST_REACH_M:
+    if reach_m < smallest_m:
         raise FieldError(
-            f"the scene lies within {reach_m:.2g} m of the camera; must reach >= {_SMALLEST_REACH_M:g} m. Scale the scene, "
+            f"the scene lies within {reach_m:.2g} m of the camera; must reach >= {smallest_m:g} m. Scale the scene, "
             "the camera's pupil and the distances of lights up together: radiance does not change.",
             path="scene.objects",
         )
@@ -124,11 +124,14 @@ def power_kept(mesh: Mesh, radiance: Spectrum) -> Spectrum:
     return radiance if abs(rounded - exact) <= _AREA_ROUNDING * exact else radiance.scaled(exact / rounded)
 
 
-def check_glass_thickness(mesh: Mesh) -> None:
-    """Refuse a pane of glass whose second side rays would skip, because they start that far off the first."""
+def check_glass_thickness(mesh: Mesh, *, ray_start: float = RAY_START, least_m: float = 1.0) -> None:
+    """Refuse a pane of glass whose second side rays would skip.
+
+    They start `ray_start` times (`least_m` + the largest coordinate) off the first.
+    """
     low, high = mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)
     nearest_m = float(np.maximum(np.maximum(low, -high), 0.0).max())
-    skipped_m = RAY_START * (1.0 + nearest_m)
+    skipped_m = ray_start * (least_m + nearest_m)
     corners = mesh.vertices_m[mesh.faces]
     crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     doubled = np.linalg.norm(crossed, axis=1)

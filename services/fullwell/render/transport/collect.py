@@ -21,7 +21,7 @@ from fullwell.scene import Cylinder, Dielectric, Disk, Material, Mesh, Part, Sce
 from fullwell.scene.tessellate import is_similarity, mesh_of, transform_mesh
 from fullwell.scene.validate import check_scene, may_repeat_faces
 
-__all__ = ["BLACK", "RAY_OFFSET", "collect_surfaces"]
+__all__ = ["BLACK", "RAY_OFFSET", "collect_surfaces", "light_groups"]
 
 BLACK = 1e-35
 """Spectra below this are black: single precision has nothing smaller to work with."""
@@ -44,13 +44,18 @@ def collect_surfaces(scene: SceneDescription, centre_m: NDArray[np.float64]) -> 
     check_reach(scene, centre_m, smallest_m=_SMALLEST_REACH_M)
     recentre = np.eye(4)
     recentre[:3, 3] = -np.asarray(centre_m, dtype=np.float64)
-    groups = sorted({p.emission.group for o in scene.objects for p in o.parts if p.emission} | {x.group for x in scene.lights})
-    collector = _Collector(tuple(groups) or ("default",))
+    collector = _Collector(light_groups(scene))
     for index, scene_object in enumerate(scene.objects):
         for number, part in enumerate(scene_object.parts):
             with naming(scene_object.id, index, number):
                 collector.add(index, part, recentre @ scene_object.to_world @ part.to_object)
     return collector.finish()
+
+
+def light_groups(scene: SceneDescription) -> tuple[str, ...]:
+    """Return the names of a scene's light groups, in alphabetical order; "default" where it has no lights."""
+    of_surfaces = {part.emission.group for item in scene.objects for part in item.parts if part.emission is not None}
+    return tuple(sorted(of_surfaces | {light.group for light in scene.lights})) or ("default",)
 
 
 @dataclass(slots=True)
@@ -107,9 +112,7 @@ class _Collector:
         return SceneSurfaces(
             vertices_m=_joined([p.mesh.vertices_m for p in pieces], 3, np.float32),
             faces=_joined(faces, 3, np.uint32),
-            face_part=np.repeat(
-                np.array([p.part for p in pieces], dtype=np.uint32), [len(p.mesh.faces) for p in pieces]
-            ),
+            face_part=np.repeat(np.array([p.part for p in pieces], dtype=np.uint32), [len(p.mesh.faces) for p in pieces]),
             normals=_joined_where_any([p.mesh.normals for p in pieces], counts, 3),
             uv=_joined_where_any([p.mesh.uv for p in pieces], counts, 2),
             emissive_faces=sum(len(p.mesh.faces) for p in pieces if p.emissive),

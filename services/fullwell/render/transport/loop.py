@@ -21,6 +21,7 @@ _NO_LEAF = 0xFFFFFFFF
 _SHADOW_SHARE = 1.0 - 5e-5
 """Share of the way to a lamp that a shadow ray looks at; the rest holds the lamp's own surface."""
 
+_FAR = 3e38
 _CAMERA_PAIRS = 3
 _BOUNCE_PAIRS = 4
 _ROULETTE_START = 3
@@ -167,14 +168,14 @@ def _decorated(dr: Any) -> Any:
     return _compiled[0]
 
 
-def _loop_body(self, given, lanes):  # type: ignore[no-untyped-def]
+def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0915 - one loop, in the order of a path
     import drjit as dr  # noqa: PLC0415
 
     mi = self._mi
     spectral = dr.llvm.ad.ArrayXf
     count = self._wavelengths
 
-    def zeros():  # type: ignore[no-untyped-def]
+    def zeros() -> Any:
         return spectral([dr.zeros(mi.Float, lanes) for _ in range(count)])
 
     sample = given.launch.first + dr.zeros(mi.UInt32, lanes)
@@ -211,7 +212,7 @@ def _loop_body(self, given, lanes):  # type: ignore[no-untyped-def]
         segments += dr.select(active, 1, 0)
 
         # Emission met by the ray, weighted against the chance that light sampling had found it
-        if self._lights.has_surfaces:
+        if "tree" in self._lights.features:
             shines = hit.valid & (hit.leaf != _NO_LEAF) & (dr.dot(hit.front_normal, direction) < 0)
             if shines:
                 row, group = self._lights.hit_emission(hit.leaf, shines)
@@ -219,8 +220,10 @@ def _loop_body(self, given, lanes):  # type: ignore[no-untyped-def]
                     hit.leaf, origin, last_normal, direction, hit.distance, hit.front_normal, shines & (last_density > 0)
                 )
                 share = dr.select(last_density > 0, last_density / (last_density + other), 1.0)
-                radiance = self._added(radiance, throughput * look_up(mi, given.tables["spectra"], row, cell_list) * share, group)
-        if self._lights.has_escaped:
+                radiance = self._added(
+                    radiance, throughput * look_up(mi, given.tables["spectra"], row, cell_list) * share, group
+                )
+        if not self._lights.features.isdisjoint(("environment", "sun")):
             escaped = active & ~hit.valid
             if escaped:
                 other = self._lights.escaped_density(last_normal, direction, escaped & (last_density > 0))
@@ -239,16 +242,16 @@ def _loop_body(self, given, lanes):  # type: ignore[no-untyped-def]
                 given.tables["spectra"], hit.material, hit.uv, cell_list, wavelengths_nm, texture_pair.y, alive
             )
             facing = dr.select(wi.z < 0, -hit.shading_normal, hit.shading_normal)
-            bound = dr.select(surface.two_sided, facing, mi.Vector3f(0))
+            bound = dr.select(surface.is_glass, mi.Vector3f(0), facing)
             lit = alive & surface.has_smooth
-            if self._lights.count > 0:  # decided while compiling; the next one is decided on the lanes
+            if self._lights.count > 0:  # noqa: SIM102 - decided while compiling; the next one on the lanes
                 if lit:
                     light = self._lights.sample(hit.point, bound, choice.x, numbers.pair(first_pair), lit)
                     wo = frame.to_local(light.direction)
                     value, density = surface.evaluate(wi, wo)
                     useful = lit & (light.pdf > 0) & dr.any(value > 0)
                     start = hit.start(light.direction, mi, dr)
-                    reach = dr.minimum(light.distance * _SHADOW_SHARE, dr.largest(mi.Float))
+                    reach = dr.minimum(light.distance * _SHADOW_SHARE, _FAR)
                     shadow = mi.Ray3f(mi.Ray3f(o=start, d=light.direction), reach)
                     useful &= ~given.scene.ray_test(shadow, coherent=False, active=useful)
                     share = dr.select(light.delta, 1.0, light.pdf / (light.pdf + density))

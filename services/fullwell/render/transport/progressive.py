@@ -15,7 +15,7 @@ from fullwell.core.errors import CancelledError, RenderError
 from fullwell.core.rng import seed32
 from fullwell.radiometry import Spectrum, WavelengthGrid
 from fullwell.render.rays import CameraRays
-from fullwell.render.transport.collect import collect_surfaces
+from fullwell.render.transport.collect import collect_surfaces, light_groups
 from fullwell.render.transport.geometry import Geometry
 from fullwell.render.transport.lights import LightSet
 from fullwell.render.transport.loop import SLOTS, Launch, PathLoop
@@ -24,15 +24,16 @@ from fullwell.render.transport.upload import upload
 from fullwell.render.transport.wavelengths import CELL_COUNT, CELL_NM, SpectraTable, cell_centres_nm, cell_means
 from fullwell.scene import Camera, SceneDescription
 
-__all__ = ["REPLICAS", "ProgressiveImage", "Reporter", "Work"]
+__all__ = ["REPLICAS", "ProgressiveImage", "Reporter", "Work", "check_samples", "light_groups"]
 
 REPLICAS = 4
 """Independent sequences per pixel. The spread of their means is the error of the image: each is stratified over all its
 samples, which makes the spread of samples within one no measure of anything."""
 
 _PHOTONS_PER_J_NM = 1.0 / (PLANCK_J_S * SPEED_OF_LIGHT_M_PER_S * NM_PER_M)
-_LANES = 1 << 17
-_SAMPLES_PER_LAUNCH = 1 << 21
+_LANES = 1 << 20
+_FILM_FLOATS = 1 << 23
+_SAMPLES_PER_LAUNCH = 1 << 22
 """Bounds memory and the time between two looks at whether to go on. The result does not depend on either."""
 
 _UNIFORM_SHARE = 0.2
@@ -104,6 +105,7 @@ class ProgressiveImage:
         self._weights = self._spectral_weights()
         importance = dict(work.group_importance)
         self._materials = MaterialTable(mi, spectra, surfaces.materials)
+        of_materials = spectra.count
         self._lights = LightSet(
             mi,
             spectra,
@@ -114,6 +116,7 @@ class ProgressiveImage:
             group_weights=np.array([importance.get(name, 1.0) for name in surfaces.groups]),
             scene_radius_m=_radius_m(self._geometry),
         )
+        self._light_shape = _mean_shape(spectra, range(of_materials, spectra.count), self._weights)
         self._loop = PathLoop(
             mi,
             self._geometry,
@@ -170,14 +173,8 @@ class ProgressiveImage:
 
     def check(self) -> None:
         """Raise RenderError where too many samples were no numbers, or where the light exceeds single precision."""
-        if self.bad_samples > _MAX_BAD_FRACTION * max(1, self.samples):
-            raise RenderError(
-                f"{self.bad_samples} of {self.samples} samples are NaN, infinite or negative; check the scene for extreme "
-                "radiances, sizes or material parameters."
-            )
-        largest = np.finfo(np.float32).max * max(1, int(self.counts.max()))
-        if not np.all(self._sums <= largest) or (self._band_sums is not None and not np.all(self._band_sums <= largest)):
-            raise RenderError("the radiance exceeds what single precision holds; scale the lights down.")
+        sums = (self._sums,) if self._band_sums is None else (self._sums, self._band_sums)
+        check_samples(self.bad_samples, self.samples, sums, int(self.counts.max()))
 
     # More of it ------------------------------------------------------------------------------------------------------
 
@@ -190,8 +187,10 @@ class ProgressiveImage:
         order = np.argsort(counts, kind="stable")
         pixels, counts = pixels[order], counts[order]
         total, done, first = int(counts.sum()), 0, 0
+        floats = len(self.groups) * self._work.grid.count if self._work.keep_bands else 1
+        lanes = min(_LANES, _FILM_FLOATS // floats)
         while first < len(pixels):
-            most = max(1, min(_LANES // REPLICAS, _SAMPLES_PER_LAUNCH // (REPLICAS * int(counts[first]))))
+            most = max(1, min(lanes // REPLICAS, _SAMPLES_PER_LAUNCH // (REPLICAS * int(counts[first]))))
             part = slice(first, min(len(pixels), first + most))
             self._launch(pixels[part], counts[part])
             done += int(counts[part].sum())
@@ -224,8 +223,8 @@ class ProgressiveImage:
                 found = np.asarray(values.numpy(), dtype=np.float64).reshape(shape)
                 self._sums[:, group, channel, pixels] += found.T
         if self._band_sums is not None and sums.bands is not None:
-            found = np.asarray(sums.bands.numpy()).reshape(*shape, len(self.groups), -1)
-            self._band_sums[pixels] += found.sum(axis=1, dtype=np.float64)
+            by_band = np.asarray(sums.bands.numpy()).reshape(*shape, len(self.groups), -1)
+            self._band_sums[pixels] += by_band.sum(axis=1, dtype=np.float64)
         self.bad_samples += int(np.sum(sums.bad.numpy()))
         self.segments += int(np.sum(sums.segments.numpy(), dtype=np.int64))
         self.counts[pixels] += counts
@@ -249,7 +248,7 @@ class ProgressiveImage:
         import drjit as dr  # noqa: PLC0415
 
         mi, work = self._mi, self._work
-        slots, density = self._slots(spectra)
+        slots, density = self._slots()
         width_nm = work.grid.step_nm * work.grid.count
         centres = cell_centres_nm()
         edges = work.grid.edges_nm
@@ -275,13 +274,12 @@ class ProgressiveImage:
             "photons_per_j_nm": dr.opaque(mi.Float, _PHOTONS_PER_J_NM),
         }
 
-    def _slots(self, spectra: SpectraTable) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
+    def _slots(self) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
         """Return (SLOTS,) cells that equal shares of the wavelengths fall into, and (cells,) probabilities.
 
         Wavelengths are drawn where the lamps shine and the channels see, plus an even share over all that may count.
         """
-        light = self._lights.spectrum_share
-        wanted = self._weights * (light if np.any(light * self._weights > 0) else 1.0)
+        wanted = self._weights * self._light_shape
         possible = self._weights > 0
         if not possible.any():
             possible = np.ones(CELL_COUNT, dtype=bool)
@@ -313,6 +311,28 @@ class ProgressiveImage:
         expected = np.maximum(REPLICAS * samples * self._work.wavelengths, 1) / bands
         complete = counts.min(axis=1) > 0
         return np.where(complete[:, None], 1.0 / np.maximum(counts, 1), 1.0 / expected[:, None])
+
+
+def check_samples(bad: int, samples: int, sums: tuple[NDArray[np.float64], ...], most: int) -> None:
+    """Raise RenderError where too many samples were no numbers, or where sums of `most` samples exceed single precision."""
+    if bad > _MAX_BAD_FRACTION * max(1, samples):
+        raise RenderError(
+            f"{bad} of {samples} samples are NaN, infinite or negative; check the scene for extreme radiances, sizes or "
+            "material parameters."
+        )
+    if not all(np.all(part <= float(np.finfo(np.float32).max) * max(1, most)) for part in sums):
+        raise RenderError("the radiance exceeds what single precision holds; scale the lights down.")
+
+
+def _mean_shape(spectra: SpectraTable, rows: range, weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (cells,) the mean of the lamps' spectra, each of the same weighted power; 1 where there is no light."""
+    shape = np.zeros(CELL_COUNT)
+    for number in rows:
+        values = np.abs(spectra.row(number)).astype(np.float64)
+        power = float(values @ weights)
+        if power > 0:
+            shape += values / power
+    return shape if np.any(shape * weights > 0) else np.ones(CELL_COUNT)
 
 
 def _whole_shares(shares: NDArray[np.float64], total: int) -> NDArray[np.int64]:

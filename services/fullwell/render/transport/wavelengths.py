@@ -65,6 +65,11 @@ class SpectraTable:
             self._rows.append(content)
         return self._known[key]
 
+    @property
+    def count(self) -> int:
+        """Number of rows so far."""
+        return len(self._rows)
+
     def row(self, number: int) -> NDArray[np.float32]:
         """Return the cell means of a row."""
         return self._rows[number]

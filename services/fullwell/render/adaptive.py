@@ -1,0 +1,210 @@
+"""Samples where they are needed: tile by tile, until the error of the light is small against the noise the sensor adds."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["NoiseTarget", "Sampler", "SamplingGoal", "SamplingOutcome", "TileErrors", "sample_until", "tile_errors"]
+
+TILE = 8
+"""Side of a tile in film samples: 64 pixels tell the error to a few per cent, and are small enough to follow shadows."""
+
+_FIRST_SAMPLES = 4
+"""Samples of each replica before anything is decided."""
+
+_GROWTH = 4.0
+"""At most this many times the samples so far in one round: the error they tell is itself uncertain."""
+
+_SAFETY = 1.05
+"""More samples than the error at hand asks for, so that one round is mostly enough."""
+
+
+class NoiseTarget(Protocol):
+    """What error of the light the sensor would not notice."""
+
+    def __call__(self, channels: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the noise variance of the sensor, expressed as light, for (channels, rows, cols) of light so far; inf where
+        nothing depends on it."""
+        ...
+
+
+class Sampler(Protocol):
+    """An image that takes more samples: a `ProgressiveImage`."""
+
+    rows: int
+    cols: int
+    counts: NDArray[np.int64]
+
+    def add(self, pixels: NDArray[np.int64], counts: NDArray[np.int64], report: Callable[[float], None]) -> None:
+        """Take more samples in each replica of the pixels."""
+        ...
+
+    def replicas(self) -> NDArray[np.float32]:
+        """Return the replicas' means, (replicas, groups, channels, rows, cols)."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class SamplingGoal:
+    """When to stop.
+
+    Attributes
+    ----------
+    noise_ratio
+        Standard error of the light over the sensor's noise that is to be reached in every tile; None for equal samples.
+    samples_per_pixel
+        Equal samples where there is no `noise_ratio`.
+    max_samples_per_pixel
+        Cap of an adaptive run.
+    time_limit_s
+        Wall time after which no further round begins; None for none. With it, results depend on the machine.
+    """
+
+    noise_ratio: float | None = 0.5
+    samples_per_pixel: int = 64
+    max_samples_per_pixel: int = 4096
+    time_limit_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TileErrors:
+    """Error over noise by tile: `ratio` (tile rows, tile cols), of the worst channel; `error` and `noise` variances pooled
+    over tiles and channels give `rms`."""
+
+    ratio: NDArray[np.float64]
+    rms: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SamplingOutcome:
+    """What a run came to.
+
+    Attributes
+    ----------
+    samples
+        (rows, cols) samples per pixel.
+    ratio
+        (tile rows, tile cols) predicted error over noise; zeros where no target was given.
+    rms_ratio
+        Root of the mean square of `ratio`.
+    unmet_tiles, tiles
+        Tiles above the target, and all.
+    stopped_by
+        "target", "samples" (the cap, or equal samples) or "time".
+    rounds
+        Passes over (parts of) the image.
+    """
+
+    samples: NDArray[np.int64]
+    ratio: NDArray[np.float64]
+    rms_ratio: float
+    unmet_tiles: int
+    tiles: int
+    stopped_by: str
+    rounds: int
+
+
+def tile_errors(replicas: NDArray[np.floating], target: NoiseTarget, group_weights: NDArray[np.float64]) -> TileErrors:
+    """Return the error of the light over the sensor's noise, by tile.
+
+    Parameters
+    ----------
+    replicas
+        (replicas, groups, channels, rows, cols): independent estimates of the light.
+    group_weights
+        (groups,) how much of each light group the picture has.
+    """
+    light = np.tensordot(replicas.astype(np.float64), group_weights, axes=(1, 0))
+    count = len(light)
+    mean = light.mean(axis=0)
+    variance = ((light - mean) ** 2).sum(axis=0) / (count * (count - 1))
+    # Averages over a tile of the error and of the noise, not of their ratio: one pixel that happens to be dark is no outlier.
+    noise = target(mean)
+    known = np.isfinite(noise)
+    pooled_error, pooled_noise = _tile_sums(np.where(known, variance, 0.0)), _tile_sums(np.where(known, noise, 0.0))
+    square = np.divide(pooled_error, pooled_noise, out=np.zeros_like(pooled_error), where=pooled_noise > 0)
+    square[(pooled_noise <= 0) & (pooled_error > 0)] = np.inf
+    worst = square.max(axis=0) if len(square) else np.zeros(square.shape[1:])
+    return TileErrors(np.sqrt(worst), float(np.sqrt(worst.mean())))
+
+
+def sample_until(
+    image: Sampler,
+    goal: SamplingGoal,
+    target: NoiseTarget | None,
+    *,
+    group_weights: NDArray[np.float64],
+    report: Callable[[float], None],
+    replicas: int,
+) -> SamplingOutcome:
+    """Take samples until the goal is reached, and say how far it was."""
+    started = time.perf_counter()
+    everything = np.arange(image.rows * image.cols, dtype=np.int64)
+    tiles_shape = (-(-image.rows // TILE), -(-image.cols // TILE))
+    report(0.0)
+    if goal.noise_ratio is None or target is None:
+        count = -(-goal.samples_per_pixel // replicas)
+        image.add(everything, np.full(len(everything), count), report)
+        errors = None if target is None else tile_errors(image.replicas(), target, group_weights)
+        return _outcome(image, errors, tiles_shape, replicas=replicas, unmet=0, stopped_by="samples", rounds=1)
+    cap = max(1, goal.max_samples_per_pixel // replicas)
+    image.add(everything, np.full(len(everything), min(_FIRST_SAMPLES, cap)), lambda f: report(0.1 * f))
+    rounds, done = 1, 0.1
+    while True:
+        errors = tile_errors(image.replicas(), target, group_weights)
+        so_far = image.counts.reshape(image.rows, image.cols)[::TILE, ::TILE]
+        more = _more_samples(errors.ratio, so_far, goal.noise_ratio, cap)
+        late = goal.time_limit_s is not None and time.perf_counter() - started > goal.time_limit_s
+        if late or not more.any():
+            unmet = int(np.count_nonzero(errors.ratio > goal.noise_ratio))
+            stopped_by = "target" if unmet == 0 else ("time" if late else "samples")
+            return _outcome(image, errors, tiles_shape, replicas=replicas, unmet=unmet, stopped_by=stopped_by, rounds=rounds)
+        by_pixel = np.repeat(np.repeat(more, TILE, axis=0), TILE, axis=1)[: image.rows, : image.cols].ravel()
+        base, share = done, (1.0 - done) * 0.6
+        image.add(everything, by_pixel, lambda f, base=base, share=share: report(base + share * f))  # type: ignore[misc]
+        done, rounds = base + share, rounds + 1
+
+
+def _more_samples(ratio: NDArray[np.float64], so_far: NDArray[np.int64], wanted: float, cap: int) -> NDArray[np.int64]:
+    """Return (tile rows, tile cols) further samples of each replica; the error falls as one over the root of their number."""
+    needed = so_far * np.minimum(_SAFETY * (ratio / wanted) ** 2, _GROWTH)
+    # Stratification is best when the number is a multiple of a power of two near it.
+    step = np.maximum(1, 2 ** np.floor(np.log2(np.maximum(so_far, 1) / 2)).astype(np.int64))
+    more = np.ceil(np.maximum(needed - so_far, 0) / step).astype(np.int64) * step
+    more = np.where(ratio > wanted, np.maximum(more, step), 0)
+    return np.minimum(more, np.maximum(cap - so_far, 0))
+
+
+def _outcome(
+    image: Sampler,
+    errors: TileErrors | None,
+    tiles_shape: tuple[int, int],
+    *,
+    replicas: int,
+    unmet: int,
+    stopped_by: str,
+    rounds: int,
+) -> SamplingOutcome:
+    ratio = np.zeros(tiles_shape) if errors is None else errors.ratio
+    return SamplingOutcome(
+        samples=(image.counts * replicas).reshape(image.rows, image.cols),
+        ratio=ratio,
+        rms_ratio=0.0 if errors is None else errors.rms,
+        unmet_tiles=unmet,
+        tiles=ratio.size,
+        stopped_by=stopped_by,
+        rounds=rounds,
+    )
+
+
+def _tile_sums(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (..., tile rows, tile cols) sums over tiles; those at the right and bottom edges may be smaller."""
+    rows, cols = values.shape[-2:]
+    down = np.add.reduceat(values, np.arange(0, rows, TILE), axis=-2)
+    return np.add.reduceat(down, np.arange(0, cols, TILE), axis=-1)

@@ -1,0 +1,245 @@
+"""Light through a camera's pupil: what sensors would count and what spectra they would see, from one rendering."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fullwell.core.errors import FullwellError, RenderError
+from fullwell.radiometry import RadianceImage, Spectrum, WavelengthGrid
+from fullwell.render.adaptive import NoiseTarget, SamplingGoal, SamplingOutcome, sample_until
+from fullwell.render.scalar import ScalarImage
+from fullwell.render.transport.progressive import REPLICAS, ProgressiveImage, Reporter, Work
+from fullwell.render.variant import activate
+from fullwell.scene import Camera, SceneDescription
+from fullwell.scene.validate import check_camera
+
+__all__ = ["LightRequest", "RenderStatistics", "RenderedLight", "render_light"]
+
+
+@dataclass(frozen=True, slots=True)
+class RenderStatistics:
+    """What the rendering did.
+
+    Attributes
+    ----------
+    samples_per_pixel, samples_min, samples_max
+        Camera rays per film sample: mean, fewest, most.
+    passes
+        Rounds of sampling.
+    bad_samples, segments
+        Samples that were no numbers and count as black; rays between two surfaces that were traced.
+    wall_s, cpu_s
+        Time, all threads' for `cpu_s`.
+    variant
+        Of the renderer.
+    noise_ratio_rms, noise_ratio_max
+        Predicted standard error over the sensor's noise, over tiles: root mean square, worst; 0 without a target.
+    tiles, unmet_tiles, stopped_by
+        Tiles of 8 x 8 film samples, those above the target, and what ended the sampling: "target", "samples" or "time".
+    """
+
+    samples_per_pixel: float
+    passes: int
+    bad_samples: int
+    wall_s: float
+    cpu_s: float
+    variant: str
+    samples_min: int = 0
+    samples_max: int = 0
+    segments: int = 0
+    noise_ratio_rms: float = 0.0
+    noise_ratio_max: float = 0.0
+    tiles: int = 0
+    unmet_tiles: int = 0
+    stopped_by: str = "samples"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LightRequest:
+    """What is wanted of a scene and a camera.
+
+    Attributes
+    ----------
+    grid
+        Bands of the spectra; also the range outside which no light counts.
+    responses
+        Electrons per photon of each channel that is kept directly, filters and the lens's transmittance included.
+    keep_bands, keep_groups
+        Whether spectral bands are kept too, and whether each light group has its own image.
+    group_weights
+        Factor of each light group's light in the picture that the goal is about, by name; 1 for those left out. For groups
+        that are kept apart.
+    group_importance
+        Factor by which the lamps of a group are sampled more often, by name; 1 for those left out.
+    max_depth
+        Segments of the longest path: 1 shows emitters only, 2 adds direct light, and so on.
+    goal, target
+        When to stop, and what noise the sensor itself has; without a target every pixel gets equal samples.
+    seed
+        The same seed gives the same bytes, for any number of threads.
+    """
+
+    grid: WavelengthGrid
+    responses: tuple[Spectrum, ...] = ()
+    keep_bands: bool = True
+    keep_groups: bool = False
+    group_weights: tuple[tuple[str, float], ...] = ()
+    group_importance: tuple[tuple[str, float], ...] = ()
+    max_depth: int = 8
+    goal: SamplingGoal = field(default_factory=SamplingGoal)
+    target: NoiseTarget | None = None
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RenderedLight:
+    """Light per solid angle of the pupil, as it reaches the film samples; lens effects but depth of field left out.
+
+    Attributes
+    ----------
+    replicas
+        (replicas, groups, channels, rows, cols) float32 [e- s^-1 m^-2 sr^-1]: independent estimates of what the channels
+        would count.
+    bands
+        (groups, rows, cols, bands) float32 [photons s^-1 m^-2 sr^-1 nm^-1], or None.
+    groups
+        Names of the light groups, or ("all",).
+    grid, tangent_pitch
+        As in `RadianceImage`.
+    statistics
+        What it took.
+    """
+
+    replicas: NDArray[np.float32]
+    bands: NDArray[np.float32] | None
+    groups: tuple[str, ...]
+    grid: WavelengthGrid
+    tangent_pitch: float
+    statistics: RenderStatistics
+
+    def weights(self, by_name: Mapping[str, float]) -> NDArray[np.float64]:
+        """Return (groups,) factors; 1 for groups that are not named."""
+        return np.array([float(by_name.get(name, 1.0)) for name in self.groups])
+
+    def channels(self, by_name: Mapping[str, float]) -> NDArray[np.float64]:
+        """Return (channels, rows, cols) [e- s^-1 m^-2 sr^-1] with the groups weighted."""
+        mean = self.replicas.mean(axis=0, dtype=np.float64)
+        return np.asarray(np.tensordot(self.weights(by_name), mean, axes=(0, 0)))
+
+    def channel_error(self, by_name: Mapping[str, float]) -> NDArray[np.float64]:
+        """Return (channels, rows, cols) standard errors of `channels`, each from few estimates: average them before use."""
+        light = np.tensordot(self.replicas.astype(np.float64), self.weights(by_name), axes=(1, 0))
+        count = len(light)
+        return np.asarray(np.sqrt(((light - light.mean(axis=0)) ** 2).sum(axis=0) / (count * (count - 1))))
+
+    def radiance(self, by_name: Mapping[str, float]) -> RadianceImage:
+        """Return the spectral image with the groups weighted. Raises RenderError where no bands were kept."""
+        if self.bands is None:
+            raise RenderError("the light was rendered without spectral bands; ask for them.")
+        weights = self.weights(by_name)
+        photons = self.bands[0] if len(self.groups) == 1 and weights[0] == 1.0 else None
+        if photons is None:
+            photons = np.tensordot(weights, self.bands, axes=(0, 0)).astype(np.float32)
+        return RadianceImage(
+            photons=photons, grid=self.grid, tangent_pitch=self.tangent_pitch, standard_error=self._relative_error(by_name)
+        )
+
+    def _relative_error(self, by_name: Mapping[str, float]) -> NDArray[np.float32] | None:
+        """Return the (rows, cols) relative standard error of the channels' sum."""
+        if self.replicas.shape[2] == 0:
+            return None
+        light = np.tensordot(self.replicas.astype(np.float64), self.weights(by_name), axes=(1, 0)).sum(axis=1)
+        count, mean = len(light), light.mean(axis=0)
+        error = np.sqrt(((light - mean) ** 2).sum(axis=0) / (count * (count - 1)))
+        relative = np.divide(error, mean, out=np.zeros_like(error), where=mean > 0)
+        return np.asarray(relative, dtype=np.float32)
+
+
+def render_light(
+    scene: SceneDescription,
+    camera: Camera,
+    request: LightRequest,
+    *,
+    progress: Callable[[float], None] | None = None,
+    should_cancel: Callable[[], bool] | None = None,
+) -> RenderedLight:
+    """Render what `request` asks for.
+
+    `progress` and `should_cancel` are called between launches, with the finished fraction in [0, 1].
+
+    Raises
+    ------
+    FieldError
+        The camera or a part of the scene cannot be rendered; the message names it.
+    RenderError
+        The renderer refused the scene or produced too many invalid samples.
+    CancelledError
+        `should_cancel` returned true.
+    """
+    started, cpu_started = time.perf_counter(), time.process_time()
+    check_camera(camera)
+    mi = activate()
+    work = Work(
+        scene=scene,
+        camera=camera,
+        grid=request.grid,
+        responses=request.responses,
+        keep_bands=request.keep_bands,
+        keep_groups=request.keep_groups,
+        max_depth=request.max_depth,
+        seed=request.seed,
+        group_importance=request.group_importance,
+    )
+    report = Reporter(progress, should_cancel)
+    try:
+        image = ProgressiveImage(mi, work) if mi.variant().startswith("llvm") else ScalarImage(mi, work)
+        by_name = dict(request.group_weights)
+        weights = np.array([by_name.get(name, 1.0) for name in image.groups])
+        outcome = sample_until(image, request.goal, request.target, group_weights=weights, report=report, replicas=REPLICAS)
+        image.check()
+        light = RenderedLight(
+            replicas=image.replicas(),
+            bands=image.bands(),
+            groups=image.groups,
+            grid=request.grid,
+            tangent_pitch=camera.tangent_pitch,
+            statistics=_statistics(image, outcome, started, cpu_started, str(mi.variant())),
+        )
+    except FullwellError:
+        raise
+    except Exception as error:
+        raise RenderError(f"the renderer failed: {_cause(error)}") from error
+    return light
+
+
+def _cause(error: BaseException) -> BaseException:
+    """Return the innermost cause: Dr.Jit wraps what happens inside its loops."""
+    while error.__cause__ is not None:
+        error = error.__cause__
+    return error
+
+
+def _statistics(
+    image: ProgressiveImage | ScalarImage, outcome: SamplingOutcome, started: float, cpu_started: float, variant: str
+) -> RenderStatistics:
+    return RenderStatistics(
+        samples_per_pixel=float(outcome.samples.mean()),
+        passes=outcome.rounds,
+        bad_samples=image.bad_samples,
+        wall_s=time.perf_counter() - started,
+        cpu_s=time.process_time() - cpu_started,
+        variant=variant,
+        samples_min=int(outcome.samples.min()),
+        samples_max=int(outcome.samples.max()),
+        segments=image.segments,
+        noise_ratio_rms=outcome.rms_ratio,
+        noise_ratio_max=float(outcome.ratio.max(initial=0.0)),
+        tiles=outcome.tiles,
+        unmet_tiles=outcome.unmet_tiles,
+        stopped_by=outcome.stopped_by,
+    )
