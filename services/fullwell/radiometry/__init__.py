@@ -9,7 +9,7 @@ from fullwell.radiometry.illuminants import (
     illuminant_names,
     planck_radiance,
 )
-from fullwell.radiometry.images import RadianceImage
+from fullwell.radiometry.images import ChannelRadiance, RadianceImage
 from fullwell.radiometry.metals import metal, metal_names, normal_reflectance
 from fullwell.radiometry.photometry import (
     chromaticity,
@@ -26,6 +26,7 @@ from fullwell.radiometry.photometry import (
 )
 from fullwell.radiometry.photons import band_photons, energy_to_photons, photon_energy_j, photons_to_energy
 from fullwell.radiometry.reflectances import COLORCHECKER_PATCHES, reflectance, reflectance_names
+from fullwell.radiometry.sky import SkyRadiance, clear_sky
 from fullwell.radiometry.spectrum import Spectrum
 from fullwell.radiometry.upsample import (
     linear_to_srgb,
@@ -35,16 +36,19 @@ from fullwell.radiometry.upsample import (
 )
 
 __all__ = [
+    "ChannelRadiance",
     "COLORCHECKER_PATCHES",
     "DEFAULT_GRID",
     "MAX_WAVELENGTH_NM",
     "MIN_WAVELENGTH_NM",
     "RadianceImage",
+    "SkyRadiance",
     "Spectrum",
     "WavelengthGrid",
     "band_photons",
     "blackbody",
     "chromaticity",
+    "clear_sky",
     "colour_matching_functions",
     "correlated_colour_temperature_k",
     "coverage_note",
