@@ -9,7 +9,7 @@ from fullwell.radiometry.illuminants import (
     illuminant_names,
     planck_radiance,
 )
-from fullwell.radiometry.images import ChannelRadiance, RadianceImage
+from fullwell.radiometry.images import RadianceImage
 from fullwell.radiometry.metals import metal, metal_names, normal_reflectance
 from fullwell.radiometry.photometry import (
     chromaticity,
@@ -36,7 +36,6 @@ from fullwell.radiometry.upsample import (
 )
 
 __all__ = [
-    "ChannelRadiance",
     "COLORCHECKER_PATCHES",
     "DEFAULT_GRID",
     "MAX_WAVELENGTH_NM",
