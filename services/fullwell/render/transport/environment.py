@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fullwell.radiometry.spectrum import Spectrum
 from fullwell.radiometry.upsample import reflectance_from_linear_srgb
+from fullwell.render.transport.upload import upload
 from fullwell.render.transport.wavelengths import CELL_COUNT, SpectraTable, cell_means, look_up
 from fullwell.scene import ImageEnvironment, SunSky
 
@@ -136,10 +137,10 @@ class MapOnDevice:
         packets = -(-components // _PACKET)
         padded = np.zeros((rows, cols, packets * _PACKET), dtype=np.float32)
         padded[..., :components] = dome.coefficients
-        self._coefficients = mi.Float(padded.ravel())
+        self._coefficients = upload(mi.Float, padded)
         names = np.full(packets * _PACKET, SpectraTable.BLACK, dtype=np.uint32)
         names[:components] = dome.spectra
-        self._spectra = mi.UInt32(names)
+        self._spectra = upload(mi.UInt32, names)
         self._packets = dr.opaque(mi.UInt32, packets)
         self._rows, self._cols = dr.opaque(mi.Int32, rows), dr.opaque(mi.Int32, cols)
         # Rows of the upper part end, and those of the lower part begin, at the horizon of a split map.
@@ -153,10 +154,10 @@ class MapOnDevice:
         self.total = float(flux.sum())
         """Brightness integrated over the sphere."""
         scale = 1.0 / self.total if self.total > 0 else 0.0
-        self._density = mi.Float((weights * scale).astype(np.float32).ravel())
-        self._row_sums = mi.Float(_running(flux.sum(axis=1)[None]).ravel())
-        self._col_sums = mi.Float(_running(flux).ravel())
-        self._row_edges = mi.Float(edges.astype(np.float32))
+        self._density = upload(mi.Float, (weights * scale).astype(np.float32))
+        self._row_sums = upload(mi.Float, _running(flux.sum(axis=1)[None]))
+        self._col_sums = upload(mi.Float, _running(flux))
+        self._row_edges = upload(mi.Float, edges.astype(np.float32))
 
     def sample(self, u: Any, active: Any) -> tuple[Any, Any]:
         """Return (direction, density [sr^-1])."""

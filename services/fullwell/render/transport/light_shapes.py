@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fullwell.render.transport.upload import upload
+
 __all__ = ["CYLINDER", "DISK", "LEAF_FLOATS", "SPHERE", "LeafTable", "ShapeSample"]
 
 LEAF_FLOATS = 12
@@ -39,7 +41,7 @@ class LeafTable:
 
         self._mi, self._dr = mi, dr
         self._four = dr.llvm.ad.Array4f
-        self._records = mi.Float(records.ravel())
+        self._records = upload(mi.Float, records)
         self._first_curved = dr.opaque(mi.UInt32, triangles)
         self._first_point = dr.opaque(mi.UInt32, triangles + curved)
 
@@ -69,35 +71,38 @@ class LeafTable:
         a = first - mi.Vector3f(point)
         return a, a + second, a + third, dr.cross(second, third)
 
-    def _solid_angle(self, a: Any, b: Any, c: Any, crossed: Any) -> tuple[Any, Any, Any, Any]:
-        """Return the solid angle [sr]; the volume of the corners' unit vectors; 1 + cos ab; cos ac + cos bc.
+    def _solid_angle(self, a: Any, b: Any, c: Any, crossed: Any) -> tuple[Any, Any, Any, tuple[Any, Any, Any]]:
+        """Return the solid angle [sr], the volume of the corners' unit vectors, their cosines ab, ac, bc, and their distances.
 
         Van Oosterom and Strackee 1983, eq. 8. The volume comes from the edges, so that small triangles keep their digits.
         """
         dr = self._dr
-        length_a, length_b, length_c = dr.norm(a), dr.norm(b), dr.norm(c)
-        product = dr.maximum(length_a * length_b * length_c, 1e-30)
-        volume = dr.abs(dr.dot(a, crossed)) / product
-        cos_ab, cos_ac = dr.dot(a, b) * length_c / product, dr.dot(a, c) * length_b / product
-        cos_bc = dr.dot(b, c) * length_a / product
-        sum_b, sum_c = 1.0 + cos_ab, cos_ac + cos_bc
-        return 2.0 * dr.atan2(volume, sum_b + sum_c), volume, sum_b, sum_c
+        distances = dr.norm(a), dr.norm(b), dr.norm(c)
+        inverse_a, inverse_b, inverse_c = (1.0 / dr.maximum(distance, 1e-15) for distance in distances)
+        volume = dr.abs(dr.dot(a, crossed)) * inverse_a * inverse_b * inverse_c
+        cosines = (
+            dr.dot(a, b) * inverse_a * inverse_b,
+            dr.dot(a, c) * inverse_a * inverse_c,
+            dr.dot(b, c) * inverse_b * inverse_c,
+        )
+        return 2.0 * dr.atan2(volume, 1.0 + cosines[0] + cosines[1] + cosines[2]), volume, cosines, distances
 
     def sample_triangle(self, record: tuple[Any, Any, Any], point: Any, u: Any) -> ShapeSample:
         """Choose a point of a triangle uniformly over its solid angle, or over its area where that is very small or large."""
         dr, mi = self._dr, self._mi
         a, b, c, crossed = self._corners(record, point)
-        sums = self._solid_angle(a, b, c, crossed)
-        solid_angle = sums[0]
+        solid_angle, volume, cosines, distances = self._solid_angle(a, b, c, crossed)
         by_angle = (solid_angle > _SMALLEST_SR) & (solid_angle < _LARGEST_SR)
-        towards = self._within_spherical_triangle((dr.normalize(a), dr.normalize(b), dr.normalize(c)), sums, u)
+        towards = self._within_spherical_triangle((a, b, c), distances, cosines, (solid_angle, volume), u)
         root = dr.sqrt(u.x)
         weight_b, weight_c = root * (1.0 - u.y), root * u.y
         place = a * (1.0 - root) + b * weight_b + c * weight_c
         direction = dr.normalize(dr.select(by_angle, towards, place))
         facing = -dr.dot(crossed, direction)
         height = -dr.dot(crossed, a)
-        distance = dr.select(by_angle, height / facing, dr.norm(place))
+        # In the lamp's own plane rounding may turn a direction past its edge.
+        farthest = dr.maximum(dr.maximum(distances[0], distances[1]), distances[2])
+        distance = dr.select(by_angle, dr.minimum(height / facing, farthest), dr.norm(place))
         density = self._triangle_density(solid_angle, crossed, facing, distance)
         good = (height > 0) & (facing > 0) & (distance > 0)
         return ShapeSample(mi.Vector3f(direction), distance, dr.select(good, density, 0.0))
@@ -108,15 +113,25 @@ class LeafTable:
         by_angle = (solid_angle > _SMALLEST_SR) & (solid_angle < _LARGEST_SR)
         return dr.select(by_angle, 1.0 / solid_angle, 2.0 * distance * distance / facing)
 
-    def _within_spherical_triangle(self, corners: tuple[Any, Any, Any], sums: tuple[Any, Any, Any, Any], u: Any) -> Any:
-        """Return a direction uniform over the spherical triangle of unit vectors `corners`.
+    def _within_spherical_triangle(self, corners: Any, distances: Any, cosines: Any, size: tuple[Any, Any], u: Any) -> Any:
+        """Return a direction uniform over a triangle's solid angle; `size` is that and the volume of the unit vectors.
 
         Arvo 1995 without inverse trigonometry: a new third corner on the arc between the first and third cuts off the share
-        u.x of the solid angle; then a point between it and the second corner. Peters 2021, section 4.
+        u.x of the solid angle; then a point between it and the second corner. Peters 2021, section 4. The longest side is
+        taken as that arc: near an edge of the lamp its ends are opposite, and any other order would lose all digits.
         """
         dr, mi = self._dr, self._mi
-        a, b, c = corners
-        solid_angle, volume, sum_b, sum_c = sums
+        solid_angle, volume = size
+        a, b, c = (corner / dr.maximum(distance, 1e-15) for corner, distance in zip(corners, distances, strict=True))
+        cos_ab, cos_ac, cos_bc = cosines
+        longest_ab, longest_bc = (cos_ab < cos_ac) & (cos_ab < cos_bc), (cos_bc < cos_ac) & (cos_bc <= cos_ab)
+        a, b, c = (
+            dr.select(longest_bc, b, a),
+            dr.select(longest_ab, c, dr.select(longest_bc, a, b)),
+            dr.select(longest_ab, b, c),
+        )
+        sum_b = 1.0 + dr.select(longest_ab, cos_ac, cos_ab)
+        sum_c = cos_ab + cos_ac + cos_bc + 1.0 - sum_b
         sin_part, cos_part = dr.sincos(0.5 * u.x * solid_angle)
         offset = a * (volume * cos_part - sum_c * sin_part) + c * (sum_b * sin_part)
         new = offset * (2.0 * dr.dot(a, offset) / dr.maximum(dr.dot(offset, offset), 1e-30)) - a

@@ -24,6 +24,7 @@ from fullwell.render.transport.environment import (
 from fullwell.render.transport.light_shapes import CYLINDER, DISK, LEAF_FLOATS, SPHERE, LeafTable
 from fullwell.render.transport.light_tree import LeafBounds, TreeWalk, build_light_tree
 from fullwell.render.transport.surfaces import CurvedShape, SceneSurfaces
+from fullwell.render.transport.upload import upload
 from fullwell.render.transport.wavelengths import SpectraTable, look_up
 from fullwell.scene import (
     ConstantEnvironment,
@@ -119,7 +120,7 @@ class LightSet:
         finite = np.flatnonzero(collected.intensity > 0)
         irradiance: dict[str, float] = {}
         self._leaves = LeafTable(mi, collected.records, triangles=collected.triangles, curved=collected.curved)
-        self._emission = mi.UInt32(np.ascontiguousarray(collected.records.view(np.uint32)[:, [3, 7]]).ravel())
+        self._emission = upload(mi.UInt32, collected.records.view(np.uint32)[:, [3, 7]])
         if len(finite):
             features |= {"tree"} | collected.kinds(finite)
             tree = build_light_tree(collected.bounds(finite), finite)
@@ -168,8 +169,8 @@ class LightSet:
             records[k, 0:3] = -light.direction
             names[k, 3], names[k, 5] = light.row, light.group
         records[:, 4] = share
-        self._distant = mi.Float(records.ravel())
-        self._distant_sums = mi.Float((running / running[-1]).astype(np.float32))
+        self._distant = upload(mi.Float, records)
+        self._distant_sums = upload(mi.Float, (running / running[-1]).astype(np.float32))
         self._distant_count = dr.opaque(mi.UInt32, len(distant))
         return float(irradiance.sum()) / 4.0
 
