@@ -16,7 +16,15 @@ from scipy.interpolate import CubicSpline
 from fullwell.render.transport.fresnel import dielectric_on_host
 from fullwell.render.transport.microfacet import POLISHED_BELOW
 
-__all__ = ["NODE_COUNT", "coat_transmittance", "glass_albedo", "hemisphere_mean", "metal_albedo", "mitsuba_internal"]
+__all__ = [
+    "NODE_COUNT",
+    "coat_transmittance",
+    "entering",
+    "glass_albedo",
+    "hemisphere_mean",
+    "metal_albedo",
+    "mitsuba_internal",
+]
 
 NODE_COUNT = 256
 
@@ -27,6 +35,8 @@ _SMALLEST_MU = 1e-5
 _ROUGH = 0.2
 
 _Row = NDArray[np.float64]
+_Light = Callable[[_Row, _Row, _Row], _Row]
+"""What goes on from a facet, by the cosine to its normal and the z of the reflected and of the refracted direction."""
 
 
 def metal_albedo(alpha: float) -> _Row:
@@ -41,16 +51,19 @@ def coat_transmittance(alpha: float, index: float) -> _Row:
     return 1.0 - _between_alphas(functools.partial(_coat_knots, index), alpha)
 
 
+def entering(alpha: float, index: float) -> _Row:
+    """Return (NODE_COUNT,) what a rough coat lets through at once, which is less: facets mask a part of it."""
+    return _between_alphas(functools.partial(_entering_knots, index), max(alpha, POLISHED_BELOW))
+
+
 @functools.lru_cache(maxsize=4096)
 def glass_albedo(alpha: float, index: float) -> _Row:
     """Return (NODE_COUNT,) reflected plus refracted light where the far side has the relative `index`."""
     # From inside, total reflection begins with an infinite slope, which costs points where the surface is rough.
     points = (48, 32) if index > 1.0 else (160, 112) if alpha > _ROUGH else (128, 48)
-    cosine, reflected, refracted, weight = _visible(_knots(), alpha, index, points)
-    fresnel = dielectric_on_host(cosine, index)[0]
-    light = np.where(reflected > 0, fresnel * _masking(reflected, alpha), 0.0)
-    light += np.where(refracted < 0, (1.0 - fresnel) * _masking(refracted, alpha), 0.0)
-    return _as_row(np.einsum("ijk,jk->i", light, weight))
+
+    mirrored, bent = _mirrored(alpha, index), _bent(alpha, index)
+    return _as_row(_at_knots(alpha, index, points, lambda *facet: mirrored(*facet) + bent(*facet)))
 
 
 def hemisphere_mean(row: _Row) -> float:
@@ -66,7 +79,7 @@ def hemisphere_mean(row: _Row) -> float:
 def mitsuba_internal(alpha: float, index: float) -> float:
     """Return the diffuse reflectance of a rough coat from below as Mitsuba's `roughplastic` computes it: a mean of 64 nodes."""
     mu = np.maximum(1e-6, np.linspace(0.0, 1.0, 64))
-    return float(2.0 * np.mean(_reflected(mu, alpha, 1.0 / index, (128, 64)) * mu))
+    return float(2.0 * np.mean(_integral(mu, alpha, 1.0 / index, (128, 64), _mirrored(alpha, 1.0 / index)) * mu))
 
 
 def _nodes() -> _Row:
@@ -100,18 +113,52 @@ def _alpha(number: int) -> float:
 
 @functools.lru_cache(maxsize=4096)
 def _metal_knots(number: int) -> _Row:
-    return _reflected(_knots(), _alpha(number), None, (96, 32))
+    alpha = _alpha(number)
+    return _at_knots(alpha, 1.0, (96, 32), _mirrored(alpha, None))
 
 
 @functools.lru_cache(maxsize=4096)
 def _coat_knots(index: float, number: int) -> _Row:
-    return _reflected(_knots(), _alpha(number), index, (32, 24))
+    alpha = _alpha(number)
+
+    return _at_knots(alpha, index, (32, 24), _mirrored(alpha, index))
 
 
-def _reflected(mu: _Row, alpha: float, index: float | None, points: tuple[int, int]) -> _Row:
-    cosine, reflected, _, weight = _visible(mu, alpha, index or 1.0, points)
-    fresnel = 1.0 if index is None else dielectric_on_host(cosine, index)[0]
-    return np.asarray(np.einsum("ijk,jk->i", np.where(reflected > 0, fresnel * _masking(reflected, alpha), 0.0), weight))
+@functools.lru_cache(maxsize=4096)
+def _entering_knots(index: float, number: int) -> _Row:
+    return _at_knots(_alpha(number), index, (32, 24), _bent(_alpha(number), index))
+
+
+def _mirrored(alpha: float, index: float | None) -> _Light:
+    """Return what facets mirror; None stands for facets that mirror everything."""
+
+    def light(cosine: _Row, reflected: _Row, _: _Row) -> _Row:
+        fresnel = 1.0 if index is None else dielectric_on_host(cosine, index)[0]
+        return np.where(reflected > 0, fresnel * _masking(reflected, alpha), 0.0)
+
+    return light
+
+
+def _bent(alpha: float, index: float) -> _Light:
+    """Return what facets refract."""
+
+    def light(cosine: _Row, _: _Row, refracted: _Row) -> _Row:
+        return np.where(refracted < 0, (1.0 - dielectric_on_host(cosine, index)[0]) * _masking(refracted, alpha), 0.0)
+
+    return light
+
+
+def _at_knots(alpha: float, index: float, points: tuple[int, int], light: _Light) -> _Row:
+    """Return the integral of `light` over the visible normals at each knot."""
+    slanted = _integral(_knots()[:-1], alpha, index, points, light)
+    # At normal incidence nothing depends on the azimuth, and nothing smooths the edges of masking and total reflection.
+    upright = _integral(np.ones(1), alpha, index, (2048, 1), light)
+    return np.concatenate([slanted, upright])
+
+
+def _integral(mu: _Row, alpha: float, index: float, points: tuple[int, int], light: _Light) -> _Row:
+    cosine, reflected, refracted, weight = _visible(mu, alpha, index, points)
+    return np.asarray(np.einsum("ijk,jk->i", light(cosine, reflected, refracted), weight))
 
 
 def _visible(mu: _Row, alpha: float, index: float, points: tuple[int, int]) -> tuple[_Row, _Row, _Row, _Row]:

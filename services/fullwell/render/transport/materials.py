@@ -20,6 +20,7 @@ from fullwell.render.transport import fresnel
 from fullwell.render.transport.albedo import (
     NODE_COUNT,
     coat_transmittance,
+    entering,
     glass_albedo,
     hemisphere_mean,
     metal_albedo,
@@ -44,6 +45,14 @@ _INDEX_STEP = 1e-3
 """Relative step of the index below which rough glass is polished: it bends light by less than single precision can follow."""
 
 
+_WIDE_FROM_ALPHA = (0.02, 0.1)
+"""Light that a metal's facets scatter repeatedly stays in the lobe of smoother metals, and goes everywhere from rougher ones:
+smooth ones lose light at grazing incidence only, and a wide lobe that holds it would be a rare bright one."""
+
+_GLASS_RANGE_NM = (380.0, 1000.0)
+"""Between its indices at these, the albedo of dispersive rough glass is linear in the index to 1e-4."""
+
+
 @dataclass(slots=True)
 class _Record:
     """One material's numbers, as the device gathers them: `_NUMBERS` in single precision, `_ROWS` as whole numbers."""
@@ -54,8 +63,11 @@ class _Record:
     inner_reflectance: float = 0.0
     coat_mean: float = 1.0
     metal_mean: float = 1.0
+    metal_wide: float = 1.0
     glass_index: float = 1.0
     exterior_index: float = 1.0
+    low_index: float = 0.0
+    high_index: float = 1.0
     flags: int = 0
     colour: int = SpectraTable.BLACK
     eta: int = SpectraTable.BLACK
@@ -65,6 +77,8 @@ class _Record:
     metal_row: int = 0
     glass_row: int = 0
     inside_row: int = 0
+    high_row: int = 0
+    high_inside_row: int = 0
     texture_offset: int = 0
     texture_rows: int = 1
     texture_cols: int = 1
@@ -77,8 +91,11 @@ _NUMBERS = (
     "inner_reflectance",
     "coat_mean",
     "metal_mean",
+    "metal_wide",
     "glass_index",
     "exterior_index",
+    "low_index",
+    "high_index",
 )
 _ROWS = (
     "flags",
@@ -90,6 +107,8 @@ _ROWS = (
     "metal_row",
     "glass_row",
     "inside_row",
+    "high_row",
+    "high_inside_row",
     "texture_offset",
     "texture_rows",
     "texture_cols",
@@ -182,7 +201,7 @@ class MaterialTable:
         record.alpha, record.coat_index = alpha, index
         if index == 1.0:
             return
-        record.coat_row = self._albedos.add(coat_transmittance, alpha, index)
+        record.coat_row = self._albedos.add(coat_transmittance if self._compensate else entering, alpha, index)
         record.coat_mean = self._albedos.mean(record.coat_row)
         # Reciprocity: what a surface lets out of diffuse light from below is what it lets in from above over index^2.
         record.inner_reflectance = 1.0 - record.coat_mean / index**2
@@ -195,6 +214,8 @@ class MaterialTable:
         if self._compensate and record.alpha >= POLISHED_BELOW:
             record.metal_row = self._albedos.add(metal_albedo, record.alpha)
             record.metal_mean = self._albedos.mean(record.metal_row)
+            low, high = _WIDE_FROM_ALPHA
+            record.metal_wide = min(1.0, max(0.0, (record.alpha - low) / (high - low)))
         self._found.add("metal")
 
     def _principled(self, record: _Record, material: Principled) -> None:
@@ -217,24 +238,31 @@ class MaterialTable:
 
     def _glass(self, record: _Record, material: Dielectric) -> None:
         record.flags |= _GLASS
-        record.exterior_index = float(material.exterior_index)
-        inside = material.interior_index
+        self._found.add("glass")
+        inside, record.exterior_index = material.interior_index, float(material.exterior_index)
+        extremes: list[float] = []
         if isinstance(inside, Spectrum):
             if np.ptp(cell_means(inside)) > 0.0:
                 record.flags |= _DISPERSIVE
                 record.index = self._spectra.add(inside)
                 self._found.add("dispersion")
+                extremes = sorted(inside.at(_GLASS_RANGE_NM) / record.exterior_index)
             inside = index_of_line(inside)
         record.glass_index = float(inside) / record.exterior_index
         record.alpha = float(material.roughness)
         if abs(record.glass_index - 1.0) < _INDEX_STEP:
             record.alpha = 0.0
-        self._found.add("glass")
         if record.alpha >= POLISHED_BELOW:
             self._found.add("rough_glass")
-            if self._compensate:
-                record.glass_row = self._albedos.add(glass_albedo, record.alpha, record.glass_index)
-                record.inside_row = self._albedos.add(glass_albedo, record.alpha, 1.0 / record.glass_index)
+            self._rough_glass(record, extremes or [record.glass_index])
+
+    def _rough_glass(self, record: _Record, indices: list[float]) -> None:
+        """Add the albedos at one index, or at the two between which others are interpolated."""
+        if not self._compensate:
+            return
+        record.low_index, record.high_index = indices[0], indices[-1] + (1.0 if len(indices) == 1 else 0.0)
+        rows = [[self._albedos.add(glass_albedo, record.alpha, n) for n in (index, 1.0 / index)] for index in indices]
+        (record.glass_row, record.inside_row), (record.high_row, record.high_inside_row) = rows[0], rows[-1]
 
     # On the device ---------------------------------------------------------------------------------------------------
 
@@ -368,7 +396,9 @@ class Surface:
             )
             self._coat_row = hit.row("coat_row") * NODE_COUNT
         if self._metal:
-            self._metallic, self._metal_mean = hit.number("metallic"), hit.number("metal_mean")
+            self._metallic, self._metal_mean, self._metal_wide = (
+                hit.number(name) for name in ("metallic", "metal_mean", "metal_wide")
+            )
             self._metal_row = hit.row("metal_row") * NODE_COUNT
             self._tinted = hit.flag(_TINTED)
         if self._glass:
@@ -376,6 +406,9 @@ class Surface:
             self._dispersive: Any = None
         if self._rough_glass:
             self._glass_rows = [hit.row(name) * NODE_COUNT for name in ("glass_row", "inside_row")]
+            if "dispersion" in features:
+                self._high_rows = [hit.row(name) * NODE_COUNT for name in ("high_row", "high_inside_row")]
+                self._low_index, self._high_index = hit.number("low_index"), hit.number("high_index")
 
     def disperse(self, dispersive: Any, indices: Any, single: Any) -> None:
         """Give glass that is `dispersive` an index for each wavelength; `single` as in `MaterialTable.at`."""
@@ -425,7 +458,7 @@ class Surface:
         weight, pdf = self._opaque(up, wo)
         weight = dr.select(pdf > 0, weight / dr.maximum(pdf, 1e-30), 0.0)
         if self._lobes:
-            mirrored = self._facet_reflectance(up.z) / dr.maximum(share, 1e-30)
+            mirrored = self._facet_reflectance(up.z, up.z) / dr.maximum(share, 1e-30)
             weight, pdf = dr.select(delta, mirrored, weight), dr.select(delta, 0.0, pdf)
         drawn = BsdfSample(
             wo, weight, pdf, mi.Bool(False) if delta is None else delta, mi.Bool(False), mi.Bool(False), mi.Float(1.0)
@@ -451,7 +484,7 @@ class Surface:
             facets = 0.25 * density(dr, half, self._alpha) * masking_per_cosine(dr, wi, self._alpha)
             facets = dr.select(self.polished, 0.0, facets)
             share = self._facet_share(wi.z)
-            reflectance = self._facet_reflectance(dr.minimum(dr.dot(wi, half), 1.0))
+            reflectance = self._facet_reflectance(dr.minimum(dr.dot(wi, half), 1.0), wi.z)
             value = value + reflectance * (facets * masking(dr, wo, self._alpha))
             pdf = dr.lerp(pdf, facets, share)
         return dr.select(above, value, 0.0), dr.select(above, pdf, 0.0)
@@ -463,7 +496,8 @@ class Surface:
             base = base * (self._coat(mu_i) * self._coat(mu_o) / self._dr.square(self._coat_index))
         if self._metal:
             scale = (1.0 - self._albedo_at(self._metal_row, mu_i)) * (1.0 - self._albedo_at(self._metal_row, mu_o))
-            repeated = self._repeated() * (scale / self._dr.maximum(1.0 - self._metal_mean, 1e-7))
+            scale = scale * self._metal_wide / self._dr.maximum(1.0 - self._metal_mean, 1e-7)
+            repeated = self.colour * self._repeated() * scale
             base = self._dr.lerp(base, repeated, self._metallic)
         return base
 
@@ -472,17 +506,19 @@ class Surface:
         return self.colour / (1.0 - self.colour * self._inner) if self._plastic else self.colour
 
     def _repeated(self) -> Any:
-        """Return what a metal reflects of the light that its facets scatter more than once (kulla2017)."""
-        colour, mean = self.colour, self._metal_mean
-        return self._dr.square(colour) * mean / (1.0 - colour * (1.0 - mean))
+        """Return what remains of a metal's light when its facets scatter it more than once, not only once (kulla2017)."""
+        return self.colour * self._metal_mean / (1.0 - self.colour * (1.0 - self._metal_mean))
 
-    def _facet_reflectance(self, cosine: Any) -> Any:
+    def _facet_reflectance(self, cosine: Any, mu_i: Any) -> Any:
+        """Return the reflectance of facets at an incidence `cosine`, with the light from `mu_i` that stays in their lobe."""
         dr = self._dr
         reflectance: Any = dr.llvm.ad.ArrayXf([self._mi.Float(0.0)] * self._count)
         if self._plastic:
             reflectance = reflectance + fresnel.dielectric(dr, cosine, self._coat_index)[0]
         if self._metal:
             metal = dr.select(self._tinted, self.colour, fresnel.conductor(dr, cosine, self.eta, self.k))
+            albedo = dr.maximum(self._albedo_at(self._metal_row, mu_i), 1e-3)
+            metal = metal * (1.0 + self._repeated() * ((1.0 - self._metal_wide) * (1.0 - albedo) / albedo))
             reflectance = dr.lerp(reflectance, metal, self._metallic)
         return reflectance
 
@@ -497,8 +533,10 @@ class Surface:
             narrow = 1.0 - entering
         if self._metal:
             albedo = self._albedo_at(self._metal_row, mu)
-            wide = dr.lerp(wide, (1.0 - albedo) * dr.mean(self._repeated(), axis=0), self._metallic)
-            narrow = dr.lerp(narrow, albedo * dr.mean(self.colour, axis=0), self._metallic)
+            repeated = (1.0 - albedo) * dr.mean(self.colour * self._repeated(), axis=0)
+            once = albedo * dr.mean(self.colour, axis=0)
+            wide = dr.lerp(wide, repeated * self._metal_wide, self._metallic)
+            narrow = dr.lerp(narrow, once + repeated * (1.0 - self._metal_wide), self._metallic)
         return dr.select(narrow > 0, narrow / dr.maximum(narrow + wide, 1e-20), 0.0)
 
     def _coat(self, mu: Any) -> Any:
@@ -520,8 +558,14 @@ class Surface:
         return (index, None) if self._dispersive is None else (index[0], index)
 
     def _regained(self, mu: Any, outside: Any) -> Any:
-        start = self._dr.select(outside, *self._glass_rows)
-        return self._dr.rcp(self._dr.maximum(self._albedo_at(start, mu), 1e-4))
+        """Return one over the light that rough glass sends on at once: what makes up for the rest."""
+        dr = self._dr
+        albedo = self._albedo_at(dr.select(outside, *self._glass_rows), mu)
+        if self._dispersive is not None:
+            high = self._albedo_at(dr.select(outside, *self._high_rows), mu)
+            position = (self._glass_index - self._low_index) / dr.maximum(self._high_index - self._low_index, 1e-6)
+            albedo = dr.lerp(albedo, high, dr.clip(position, 0.0, 1.0))
+        return dr.rcp(dr.maximum(albedo, 1e-4))
 
     def _per_wavelength(self, cosine: Any, reflectance: Any, indices: Any, reflected: Any) -> Any:
         """Return what a lobe of the first wavelength weighs at each: other indices reflect another share, and refract away."""

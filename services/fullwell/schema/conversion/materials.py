@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from fullwell.core.errors import unknown_name_message
-from fullwell.radiometry import metal
+from fullwell.radiometry import Spectrum, metal
+from fullwell.radiometry.glasses import glass, glass_from_abbe
 from fullwell.scene import (
     Conductor,
     Dielectric,
@@ -61,7 +62,8 @@ def _converted(document: Any, path: str, context: Context) -> tuple[Material, Em
         case documents.ConductorMaterial():
             return _conductor(document, path, context), None
         case documents.DielectricMaterial():
-            return Dielectric(document.interior_index, document.exterior_index, document.roughness), None
+            index = _index(document.interior_index, f"{path}.interior_index")
+            return Dielectric(index, document.exterior_index, document.roughness), None
         case documents.MirrorMaterial():
             return Mirror(reflectance_of(document.reflectance, f"{path}.reflectance", context)), None
         case documents.EmissiveMaterial():
@@ -69,6 +71,17 @@ def _converted(document: Any, path: str, context: Context) -> tuple[Material, Em
             return base, emission_of(document, path, context)
         case _:
             raise TypeError(f"{type(document).__name__} is not a material")
+
+
+def _index(given: Any, path: str) -> float | Spectrum:
+    match given:
+        case documents.AbbeIndex():
+            return glass_from_abbe(given.n_d, given.abbe)
+        case str():
+            with located(path):
+                return glass(given.removeprefix("glass:"), path=path)
+        case _:
+            return float(given)
 
 
 def _conductor(document: documents.ConductorMaterial, path: str, context: Context) -> Conductor:

@@ -6,10 +6,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from fullwell.schema.v1.common import Document, Fraction, Group, NonNegative, Range, Text, exactly_one, refuse
+from fullwell.schema.v1.common import _EXPONENT_NUMBER, Document, Fraction, Group, NonNegative, Range, Text, exactly_one, refuse
 from fullwell.schema.v1.spectra import Quantity, Reflectance, Spd, SpectrumTable
 
-__all__ = ["MaterialDocument", "MaterialReference"]
+__all__ = ["AbbeIndex", "MaterialDocument", "MaterialReference"]
 
 _Index = Annotated[float, Range(ge=1, le=5)]
 _Alpha = Annotated[float, Range(gt=0, le=1)]
@@ -59,11 +59,33 @@ class ConductorMaterial(Document):
         return self
 
 
+class AbbeIndex(Document):
+    """An index over wavelength by Cauchy's formula: `n_d` at 587.56 nm, and the Abbe number."""
+
+    n_d: _Index
+    abbe: Annotated[float, Range(ge=10, le=200)]
+
+
+def _index_form(value: Any) -> str | None:
+    if isinstance(value, str):
+        return "number" if _EXPONENT_NUMBER.fullmatch(value) else "name"
+    if isinstance(value, dict | AbbeIndex):
+        return "cauchy"
+    return "number"
+
+
+_RefractiveIndex = Annotated[
+    Annotated[_Index, Tag("number")] | Annotated[Text, Tag("name")] | Annotated[AbbeIndex, Tag("cauchy")],
+    Discriminator(_index_form),
+]
+"""One number, the name of a glass ("glass:N-BK7"), or {n_d, abbe}: the last two disperse."""
+
+
 class DielectricMaterial(Document):
     """Clear refracting body such as glass or water."""
 
     kind: Literal["dielectric"]
-    interior_index: _Index = 1.5046
+    interior_index: _RefractiveIndex = 1.5046
     exterior_index: _Index = 1.000277
     roughness: Fraction = 0.0
 
