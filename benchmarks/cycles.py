@@ -1,0 +1,360 @@
+"""Blender Cycles on the CPU as a peer: the same triangles, colours as linear sRGB, lamps as emission, the same camera.
+
+Cycles is a development tool here, no dependency: Blender is under the GPL and large. Put it into an environment of its own,
+
+    python3.11 -m venv /tmp/bpy-venv && /tmp/bpy-venv/bin/pip install bpy==5.0.1
+
+and name its interpreter in FULLWELL_BENCH_BPY (default /tmp/bpy-venv/bin/python). Then
+python -m benchmarks.cycles [--scene NAME] [--size 160x120] [--samples 64] [--reference-seconds 40]
+prints for each scene the CPU-seconds that Cycles and Mitsuba need for the same relative error of the luminance.
+
+What is not the same: three colours instead of spectra, so colours of light after several bounces; the sun and sky are a sampled
+image and a disc; rough plastic and metals are Blender's Principled BSDF. Each renderer is compared with its own long run, so
+these differences do not count as noise.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.baselines import MitsubaPath
+from benchmarks.engines import Budget, Engine, Result, Stopwatch
+from benchmarks.measures import luminance, luminance_relative_mse
+from benchmarks.references import extend_reference
+from benchmarks.scenes import SCENES, build_frame
+from fullwell.radiometry import Spectrum, illuminant, normal_reflectance, tristimulus
+from fullwell.render import activate
+from fullwell.scene import (
+    Conductor,
+    ConstantEnvironment,
+    Dielectric,
+    Diffuse,
+    DirectionalLight,
+    Material,
+    Mirror,
+    Part,
+    Principled,
+    RoughPlastic,
+    SceneDescription,
+    SunSky,
+    Texture,
+)
+from fullwell.scene.tessellate import mesh_of, transform_mesh
+from fullwell.schema.frame import FrameDescription
+
+__all__ = ["CyclesEngine", "export_scene", "linear_srgb"]
+
+_CHILD = Path(__file__).with_name("cycles_child.py")
+_XYZ_TO_SRGB = np.array(
+    [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]
+)
+"""IEC 61966-2-1:1999."""
+_UNIT_CD_M2 = 100.0
+"""Luminance of Cycles' 1.0."""
+_SUN_DIAMETER_DEG = 0.5358
+_SKY_ROWS = 96
+
+
+# Colours -------------------------------------------------------------------------------------------------------------
+
+
+def linear_srgb(spectrum: Spectrum, *, reflectance: bool) -> list[float]:
+    """Return linear sRGB: of a reflectance under D65, of a light in units of 100 cd m^-2; negative values become 0."""
+    if not reflectance:
+        return [max(0.0, float(value)) for value in _XYZ_TO_SRGB @ tristimulus(spectrum) / _UNIT_CD_M2]
+    light = illuminant("D65")
+    seen = Spectrum(light.wavelength_nm, light.values * spectrum.at(light.wavelength_nm), outside="zero", source="")
+    rgb = _XYZ_TO_SRGB @ (tristimulus(seen) / tristimulus(light)[1])
+    return [min(1.0, max(0.0, float(value))) for value in rgb]
+
+
+def _colour(value: Spectrum | Texture) -> list[float]:
+    if isinstance(value, Texture):
+        raise TypeError("textures are not exported to Cycles; the benchmark scenes have none")
+    return linear_srgb(value, reflectance=True)
+
+
+def _under_coat(reflectance: Spectrum | Texture, index: float) -> list[float]:
+    """Return what the base looks like through its coat, whose inside sends light back: rho (1 - F) / (1 - rho F).
+
+    Blender's base colour is that after all passes. F, the diffuse reflectance from inside, is the fit of Egan and Hilgeman
+    (1973).
+    """
+    inside = -1.4399 / index**2 + 0.7099 / index + 0.6681 + 0.0636 * index
+    return [value * (1 - inside) / (1 - value * inside) for value in _colour(reflectance)]
+
+
+def _metal(material: Conductor) -> list[float]:
+    nm = np.arange(380.0, 781.0, 5.0)
+    return linear_srgb(
+        Spectrum(nm, normal_reflectance(material.eta.at(nm), material.k.at(nm)), outside="hold", source=""), reflectance=True
+    )
+
+
+def _index(index: float | Spectrum) -> float:
+    return index if isinstance(index, float) else float(index.at(550.0))
+
+
+def _material(material: Material) -> dict[str, Any]:
+    """Return what the child builds: Blender's roughness is the square root of GGX alpha."""
+    match material:
+        case Diffuse():
+            return {"kind": "diffuse", "color": _colour(material.reflectance)}
+        case RoughPlastic():
+            return {
+                "kind": "principled",
+                "color": _under_coat(material.reflectance, material.interior_index),
+                "roughness": material.roughness**0.5,
+                "ior": material.interior_index,
+                "metallic": 0.0,
+            }
+        case Principled():
+            return {
+                "kind": "principled",
+                "color": _under_coat(material.base_color, 1.5) if material.metallic < 1 else _colour(material.base_color),
+                "roughness": material.roughness,
+                "ior": 1.5,
+                "metallic": material.metallic,
+            }
+        case Conductor():
+            return {
+                "kind": "principled",
+                "color": _metal(material),
+                "roughness": material.roughness**0.5,
+                "ior": 1.5,
+                "metallic": 1.0,
+            }
+        case Mirror():
+            return {"kind": "principled", "color": _colour(material.reflectance), "roughness": 0.0, "ior": 1.5, "metallic": 1.0}
+        case Dielectric():
+            return {
+                "kind": "glass",
+                "ior": _index(material.interior_index) / _index(material.exterior_index),
+                "roughness": material.roughness**0.5,
+            }
+
+
+# Scene ---------------------------------------------------------------------------------------------------------------
+
+
+def export_scene(frame: FrameDescription, folder: Path) -> None:
+    """Write scene.json and scene.npz: triangles joined by material, in the camera's place and the world's directions."""
+    rig = frame.cameras[0]
+    centre = rig.camera.camera_to_world[:3, 3]
+    meshes, materials = _joined(frame.scene, centre)
+    arrays: dict[str, NDArray[Any]] = {}
+    for number, (vertices, faces, normals) in enumerate(meshes):
+        arrays |= {
+            f"v{number}": vertices.astype(np.float32),
+            f"f{number}": faces.astype(np.int32),
+            f"n{number}": normals.astype(np.float32),
+        }
+    document = {"materials": materials, "camera": _camera(frame), "lights": _lights(frame, arrays)}
+    np.savez(folder / "scene.npz", **arrays)  # type: ignore[arg-type]
+    (folder / "scene.json").write_text(json.dumps(document))
+
+
+def _joined(scene: SceneDescription, centre: NDArray[np.float64]) -> tuple[list[Any], list[dict[str, Any]]]:
+    """Return (vertices, faces, normals) of each material and the materials; parts that look the same are one."""
+    groups: dict[str, list[Any]] = {}
+    recentre = np.eye(4)
+    recentre[:3, 3] = -centre
+    for item in scene.objects:
+        for part in item.parts:
+            described = _material(part.material)
+            if part.emission is not None:
+                described = {"kind": "emission", "color": linear_srgb(part.emission.radiance, reflectance=False)}
+            groups.setdefault(json.dumps(described), []).append(_triangles(part, recentre @ item.to_world @ part.to_object))
+    meshes = []
+    for parts in groups.values():
+        starts = np.cumsum([0, *(len(part[0]) for part in parts)])
+        faces = np.concatenate([part[1] + start for part, start in zip(parts, starts, strict=False)])
+        meshes.append((np.concatenate([part[0] for part in parts]), faces, np.concatenate([part[2] for part in parts])))
+    return meshes, [json.loads(key) for key in groups]
+
+
+def _triangles(part: Part, to_world: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+    """Return vertices, faces and vertex normals; a flat mesh has its corners taken apart."""
+    mesh = transform_mesh(to_world, mesh_of(part.geometry))
+    faces = mesh.faces.astype(np.int64)
+    if mesh.normals is not None:
+        return mesh.vertices_m, faces, mesh.normals
+    corners = mesh.vertices_m[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+    return corners.reshape(-1, 3), np.arange(faces.size).reshape(-1, 3), np.repeat(normals, 3, axis=0)
+
+
+def _camera(frame: FrameDescription) -> dict[str, Any]:
+    camera = frame.cameras[0].camera
+    pose = camera.camera_to_world.copy()
+    pose[:3, 3] = 0.0
+    pose[:3, 1:3] *= -1.0  # Blender's camera looks along -z, y up
+    thin = camera.lens.kind == "thin_lens"
+    return {
+        "pose": pose.tolist(),
+        "rows": camera.film.rows,
+        "cols": camera.film.cols,
+        "angle_x": float(2 * np.arctan(camera.film.cols * camera.tangent_pitch / 2)),
+        "pupil_radius_m": camera.lens.pupil_diameter_m / 2 if thin else 0.0,
+        "focus_m": float(min(camera.lens.focus_distance_m, 1e6)) if thin else 0.0,
+        "max_depth": frame.quality.max_depth,
+    }
+
+
+def _lights(frame: FrameDescription, arrays: dict[str, NDArray[Any]]) -> list[dict[str, Any]]:
+    lights: list[dict[str, Any]] = []
+    for light in frame.scene.lights:
+        match light:
+            case ConstantEnvironment():
+                lights.append({"kind": "constant", "color": linear_srgb(light.radiance, reflectance=False)})
+            case DirectionalLight():
+                colour = linear_srgb(light.irradiance, reflectance=False)
+                lights.append({"kind": "sun", "direction": list(light.direction), "color": colour, "angle": 0.0})
+            case SunSky():
+                sky, sun = _sampled_sky(light)
+                arrays["sky"] = sky
+                direction = [-float(x) for x in np.asarray(light.sun_direction) / np.linalg.norm(light.sun_direction)]
+                lights.append({"kind": "sky"})
+                lights.append(
+                    {"kind": "sun", "direction": direction, "color": sun, "angle": float(np.radians(_SUN_DIAMETER_DEG))}
+                )
+            case _:
+                raise TypeError(f"{type(light).__name__} is not exported to Cycles; the benchmark scenes have none")
+    return lights
+
+
+def _sampled_sky(light: SunSky) -> tuple[NDArray[np.float32], list[float]]:
+    """Return our renderer's sky as an image (rows, cols, 3) from the nadir up, and the sun's irradiance, linear sRGB."""
+    x, y, z = np.asarray(light.sun_direction, dtype=np.float64) / np.linalg.norm(light.sun_direction)
+    described = {"type": "sunsky", "sun_direction": [x, y, z], "turbidity": light.turbidity, "albedo": light.ground_albedo}
+    rows, cols = _SKY_ROWS, 2 * _SKY_ROWS
+    tilt = np.pi * ((np.arange(rows) + 0.5) / rows - 0.5)
+    # Blender's equirectangular projection: the left edge is at -x of azimuth pi, azimuth falls to the right.
+    azimuth = np.pi - 2 * np.pi * (np.arange(cols) + 0.5) / cols
+    a, t = np.meshgrid(azimuth, tilt)
+    towards = np.stack([np.cos(t) * np.cos(a), np.cos(t) * np.sin(a), np.sin(t)], axis=-1).reshape(-1, 3)
+    sky = _environment_rgb(described | {"sun_scale": 0.0, "sky_scale": light.sky_weight}, towards)
+    radius = np.radians(_SUN_DIAMETER_DEG / 2)
+    side = np.cross([x, y, z], [0, 0, 1.0])
+    side /= np.linalg.norm(side)
+    other = np.cross(side, [x, y, z])
+    rng = np.random.Generator(np.random.Philox(1))
+    share, turn = np.sqrt(rng.random(2048)) * radius * 0.999, rng.random(2048) * 2 * np.pi
+    disc = np.array([x, y, z]) + share[:, None] * (np.cos(turn)[:, None] * side + np.sin(turn)[:, None] * other)
+    disc /= np.linalg.norm(disc, axis=1, keepdims=True)
+    sun = _environment_rgb(described | {"sun_scale": light.sun_weight, "sky_scale": 0.0}, disc).mean(axis=0)
+    return sky.reshape(rows, cols, 3).astype(np.float32), (sun * 2 * np.pi * (1 - np.cos(radius))).tolist()
+
+
+def _environment_rgb(described: dict[str, Any], towards: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the radiance (n, 3) of an environment emitter towards directions, linear sRGB in units of 100 cd m^-2."""
+    import drjit as dr  # noqa: PLC0415 - loaded with the renderer
+
+    mi = activate()
+    emitter = mi.load_dict({"type": "scene", "sky": described}).environment()
+    si = dr.zeros(mi.SurfaceInteraction3f, len(towards))
+    si.wi = mi.Vector3f(*(-np.ascontiguousarray(column, dtype=np.float32) for column in towards.T))
+    nm = np.arange(400.0, 717.0, 10.0)
+    radiance = []
+    for first in range(0, len(nm), 4):
+        si.wavelengths = mi.Spectrum(*(float(w) for w in nm[first : first + 4]))
+        radiance += [np.broadcast_to(np.array(emitter.eval(si)[k]), len(towards)) for k in range(4)]
+    weights = np.stack([tristimulus(Spectrum(nm, np.eye(len(nm))[k], outside="zero", source="")) for k in range(len(nm))])
+    return np.asarray(np.maximum(np.stack(radiance, axis=1) @ weights @ _XYZ_TO_SRGB.T / _UNIT_CD_M2, 0.0))
+
+
+# Engine --------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(eq=False)
+class CyclesEngine:
+    """Cycles in a child process. The time is that of a render of N samples less one of a single sample: no start-up."""
+
+    light_tree: bool = True
+    python: str = os.environ.get("FULLWELL_BENCH_BPY", "/tmp/bpy-venv/bin/python")
+
+    @property
+    def name(self) -> str:
+        """Name and settings."""
+        return f"cycles {'light tree' if self.light_tree else 'no light tree'}"
+
+    def render(self, frame: FrameDescription, budget: Budget) -> Result:
+        """Return the luminance [cd m^-2] of the frame's first camera, (rows, cols, 1)."""
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            export_scene(frame, folder)
+            task = {"samples": budget.samples_per_pixel, "seed": budget.seed % 2**31, "light_tree": self.light_tree}
+            (folder / "task.json").write_text(json.dumps(task))
+            watch = Stopwatch()
+            command = [self.python, "-P", str(_CHILD), str(folder)]  # -P: our cycles.py must not hide Blender's own
+            child = subprocess.run(command, capture_output=True, text=True, check=False)
+            whole_s = watch.read()[0]
+            if child.returncode:
+                raise RuntimeError(f"Cycles failed: {(child.stderr or child.stdout)[-2000:]}")
+            told = json.loads((folder / "told.json").read_text())
+            rgb = np.load(folder / "rgb.npy").astype(np.float64)
+        weights = np.linalg.inv(_XYZ_TO_SRGB)[1] * _UNIT_CD_M2
+        cpu_s = told["cpu_s"] - told["one_sample_cpu_s"]
+        wall_s = told["wall_s"] - told["one_sample_wall_s"]
+        image = (rgb[..., :3] @ weights)[..., None].astype(np.float32)
+        return Result("luminance", image, cpu_s, wall_s, budget.samples_per_pixel, whole_s - told["cpu_s"])
+
+
+def _efficiency(engine: Engine, frame: FrameDescription, samples: int, reference_s: float) -> dict[str, Any]:
+    """Return relMSE of the luminance after `samples`, against the engine's own long run, and their product with the time."""
+    reference = extend_reference(frame, engine, seconds=reference_s, samples_per_pass=max(64, samples))
+    result = engine.render(frame, Budget(samples, seed=1234567))
+    result = engine.render(frame, Budget(samples, seed=7654321)) if engine.name.startswith("mitsuba") else result
+    images = [
+        luminance(image, frame.grid) if result.kind == "bands" else image[..., 0] for image in (result.image, reference.image)
+    ]
+    error = luminance_relative_mse(*images, clip_percentile=99.0)
+    return {
+        "engine": engine.name,
+        "samples": result.samples,
+        "reference_samples": reference.samples,
+        "cpu_s": round(result.cpu_s, 3),
+        "luminance_relmse": error,
+        "cpu_s_times_relmse": result.cpu_s * error,
+        "mean_luminance": float(images[0].mean()),
+    }
+
+
+def main() -> None:
+    """Compare both engines on the scenes asked for."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scene", choices=sorted(SCENES), action="append")
+    parser.add_argument("--size", default="160x120")
+    parser.add_argument("--samples", type=int, default=64)
+    parser.add_argument("--reference-seconds", type=float, default=40.0)
+    arguments = parser.parse_args()
+    cols, rows = (int(text) for text in arguments.size.split("x"))
+    for scene in arguments.scene or SCENES:
+        with tempfile.TemporaryDirectory() as folder:
+            frame = build_frame(scene, Path(folder), size=(cols, rows))
+        told = [
+            _efficiency(engine, frame, arguments.samples, arguments.reference_seconds)
+            for engine in (CyclesEngine(), MitsubaPath())
+        ]
+        ratio = told[0]["cpu_s_times_relmse"] / told[1]["cpu_s_times_relmse"]
+        print(
+            json.dumps(
+                {"scene": scene, "cycles": told[0], "mitsuba": told[1], "cpu_cycles_over_mitsuba_at_equal_error": ratio}
+            ),
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()
