@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Any
 
@@ -75,12 +76,9 @@ def image_map(light: ImageEnvironment, spectra: SpectraTable) -> DomeMap:
 
 
 def sun_and_sky(light: SunSky, spectra: SpectraTable) -> tuple[DomeMap | None, SunDisk | None]:
-    """Return the clear sky's map and the sun's disk, each None where its weight is 0."""
-    from fullwell.radiometry.sky import clear_sky  # noqa: PLC0415 - only skies need it
-
-    x, y, z = np.asarray(light.sun_direction, dtype=np.float64) / np.linalg.norm(light.sun_direction)
-    towards = np.array([x, y, max(_LOWEST_SUN_SINE, z)])
-    sky = clear_sky(towards, turbidity=light.turbidity, ground_albedo=light.ground_albedo, rows=_SKY_ROWS, cols=_SKY_COLS)
+    """Return the clear sky's map and the sun's disk, each None where its weight is 0. Black below the horizon."""
+    x, y, z = (float(v) for v in np.asarray(light.sun_direction, dtype=np.float64) / np.linalg.norm(light.sun_direction))
+    sky = _clear_sky((x, y, max(_LOWEST_SUN_SINE, z)), float(light.turbidity), float(light.ground_albedo))
 
     def row_of(values: Array, weight: float) -> int:
         return spectra.add(Spectrum(sky.wavelength_nm, values * weight, outside="zero"))
@@ -94,6 +92,14 @@ def sun_and_sky(light: SunSky, spectra: SpectraTable) -> tuple[DomeMap | None, S
         row = row_of(sky.sun_radiance, light.sun_weight)
         sun = SunDisk(direction / np.linalg.norm(direction), float(sky.sun_radius_rad), row)
     return dome, sun
+
+
+@functools.lru_cache(maxsize=4)
+def _clear_sky(towards: tuple[float, float, float], turbidity: float, ground_albedo: float) -> Any:
+    """Return the sky, remembered: the frames of one recipe share it, and it takes up to a second."""
+    from fullwell.radiometry.sky import clear_sky  # noqa: PLC0415 - only skies need it
+
+    return clear_sky(towards, turbidity=turbidity, ground_albedo=ground_albedo, rows=_SKY_ROWS, cols=_SKY_COLS)
 
 
 # Where to sample -----------------------------------------------------------------------------------------------------

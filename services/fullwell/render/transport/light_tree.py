@@ -226,8 +226,9 @@ class _Builder:
         centre = [(0.5 * (a + b)).astype(np.float32).astype(np.float64) for a, b in zip(low, high, strict=True)]
         off = [values[order] - c[segment] for values, c in zip(self._middle.T, centre, strict=True)]
         reach = _length(off) + bounds.radius_m[order]
-        diagonal = _length([b - a for a, b in zip(low, high, strict=True)])
-        radius = np.minimum(np.maximum.reduceat(reach, starts), 0.5 * diagonal)
+        # Half the box's diagonal, seen from a centre that is rounded to single precision.
+        corner = _length([np.maximum(b - c, c - a) for a, b, c in zip(low, high, centre, strict=True)])
+        radius = np.minimum(np.maximum.reduceat(reach, starts), corner)
         intensity, *total = (np.add.reduceat(values[order], starts) for values in self._sums)
         axis, spread = self._cones(total, order, segment, starts)
         emission = np.maximum.reduceat(bounds.emission_rad[order], starts)
