@@ -14,7 +14,7 @@ from PIL import Image, ImageDraw
 
 from fullwell.core import atomic_write
 from fullwell.dataset.contact import picture_of_products
-from fullwell.pipeline import RadianceCache, render_frame
+from fullwell.pipeline import LightCache, render_frame
 from fullwell.schema import RecipeBuilder, load_recipe
 from fullwell.storage import LocalStore
 
@@ -36,7 +36,7 @@ def main(arguments: list[str]) -> None:
 def make(recipe: Path, target: Path, *, overrides: dict[str, str]) -> None:
     """Render every frame of a recipe and write its pictures."""
     document = load_recipe(recipe, overrides=overrides)
-    builder, cache = RecipeBuilder(document, base_dir=document.base_dir), RadianceCache()
+    builder, cache = RecipeBuilder(document, base_dir=document.base_dir), LightCache()
     frames = [builder.frame(index) for index in range(document.frame_count())]
     with tempfile.TemporaryDirectory() as folder:
         store = LocalStore(Path(folder))

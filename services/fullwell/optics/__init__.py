@@ -1,6 +1,7 @@
 """From scene radiance to irradiance on the sensor: one module per effect, `model` holds their order."""
 
 from fullwell.optics.camera_equation import on_axis_factor_sr, projected_solid_angle_sr, working_f_number
+from fullwell.optics.channels import channels_suffice, form_channel_image
 from fullwell.optics.defocus import circle_of_confusion_px, defocus, defocus_layers
 from fullwell.optics.diffraction import (
     airy_radius_m,
@@ -39,6 +40,7 @@ __all__ = [
     "Wavefront",
     "airy_radius_m",
     "aperture_mask",
+    "channels_suffice",
     "circle_of_confusion_px",
     "compute_irradiance",
     "cos_fourth",
@@ -51,6 +53,7 @@ __all__ = [
     "diffraction_otf",
     "disc_falloff",
     "flare_point_image",
+    "form_channel_image",
     "gaussian_psf",
     "nyquist_contrast_loss",
     "on_axis_factor_sr",

@@ -1,11 +1,12 @@
 """From a recipe to published frames: plan, stages, keys, cache, frame runner."""
 
-from fullwell.pipeline.cache import RadianceCache, with_cache_steps
+from fullwell.pipeline.cache import LightCache, with_cache_steps
 from fullwell.pipeline.frame import MANIFEST_NAME, MANIFEST_SCHEMA, render_frame
-from fullwell.pipeline.plan import FramePlan, PlanStep, plan_document, plan_frame
+from fullwell.pipeline.plan import FramePlan, plan_document, plan_frame
 from fullwell.pipeline.progress import CancelCheck, FrameProgress, ProgressCallback
 from fullwell.pipeline.run import run_frame
 from fullwell.pipeline.stage_store import StageStore
+from fullwell.pipeline.steps import PlanStep
 
 __all__ = [
     "MANIFEST_NAME",
@@ -13,9 +14,9 @@ __all__ = [
     "CancelCheck",
     "FramePlan",
     "FrameProgress",
+    "LightCache",
     "PlanStep",
     "ProgressCallback",
-    "RadianceCache",
     "StageStore",
     "plan_document",
     "plan_frame",

@@ -1,4 +1,4 @@
-"""Radiance images kept between frames: in this process's memory, and behind that in the object store that workers share."""
+"""Rendered light kept between frames: in this process's memory, and behind that in the object store that workers share."""
 
 from __future__ import annotations
 
@@ -21,70 +21,70 @@ from numpy.typing import NDArray
 
 import fullwell
 from fullwell.core.hashing import canonical_json, digest_of, sha256_file
-from fullwell.pipeline.keys import radiance_key
+from fullwell.pipeline.keys import light_key
 from fullwell.pipeline.plan import FramePlan, PlanStep
 from fullwell.pipeline.stage_store import StageStore
-from fullwell.radiometry import RadianceImage, WavelengthGrid
-from fullwell.render import RenderStatistics, choose_variant
+from fullwell.radiometry import WavelengthGrid
+from fullwell.render import RenderedLight, RenderStatistics, choose_variant
 from fullwell.schema.frame import FrameDescription
 
 __all__ = [
-    "ObtainedRadiance",
-    "RadianceCache",
-    "decode_radiance",
-    "encode_radiance",
-    "obtain_radiance",
-    "stored_radiance_key",
+    "LightCache",
+    "ObtainedLight",
+    "decode_light",
+    "encode_light",
+    "obtain_light",
+    "stored_light_key",
     "with_cache_steps",
 ]
 
-KIND = "radiance"
-_ENTRY_VERSION = 1
+KIND = "light"
+_ENTRY_VERSION = 2
 _MAX_BYTES = 1 << 30
 _ALIGNMENT = 64
 _FLOAT_BYTES = 4
 _LENGTH = struct.Struct("<I")
 _MAKERS = ("core", "radiometry", "scene", "render")
-"""The packages whose code decides a radiance image, beside those whose versions are named."""
+"""The packages whose code decides rendered light, beside those whose versions are named."""
 _INSTRUCTION_SETS = ("fma", "avx", "avx2", "avx512f", "neon", "asimd", "sve")
 
-Rendered = tuple[RadianceImage, RenderStatistics]
+Shapes = tuple[tuple[int, ...], tuple[int, ...] | None]
 
 log = structlog.get_logger("fullwell.cache")
 
 
-class RadianceCache:
-    """The most recently used radiance images by content key, up to `max_bytes`. Not for use by several threads at once."""
+class LightCache:
+    """The most recently used light by content key, up to `max_bytes`. Not for use by several threads at once."""
 
     def __init__(self, max_bytes: int = _MAX_BYTES) -> None:
         self._max_bytes = max_bytes
-        self._entries: OrderedDict[str, Rendered] = OrderedDict()
+        self._entries: OrderedDict[str, RenderedLight] = OrderedDict()
 
-    def get(self, key: str) -> Rendered | None:
-        """Return the image of a key and what it took to render, or None."""
+    def get(self, key: str) -> RenderedLight | None:
+        """Return the light of a key, or None."""
         entry = self._entries.get(key)
         if entry is not None:
             self._entries.move_to_end(key)
         return entry
 
-    def put(self, key: str, image: RadianceImage, statistics: RenderStatistics) -> None:
-        """Keep an image; the least recently used ones make room. One larger than the cache is not kept."""
-        if image.photons.nbytes > self._max_bytes:
+    def put(self, key: str, light: RenderedLight) -> None:
+        """Keep light; the least recently used makes room. What is larger than the cache is not kept."""
+        if _bytes(light) > self._max_bytes:
             return
-        self._entries[key] = (image, statistics)
+        self._entries[key] = light
         self._entries.move_to_end(key)
-        while sum(kept.photons.nbytes for kept, _ in self._entries.values()) > self._max_bytes:
+        while sum(_bytes(kept) for kept in self._entries.values()) > self._max_bytes:
             self._entries.popitem(last=False)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ObtainedRadiance:
-    """A radiance image, and where it came from.
+class ObtainedLight:
+    """Rendered light, and where it came from.
 
     Attributes
     ----------
-    image, statistics
-        As rendered, by this process or by the one that kept them: the same bytes.
+    light
+        As rendered, by this process or by the one that kept it: the same bytes.
     source
         "memory" and "store" are hits; "render" is a miss.
     stored_as
@@ -95,8 +95,7 @@ class ObtainedRadiance:
         Time that all of it took, rendering and waiting included.
     """
 
-    image: RadianceImage
-    statistics: RenderStatistics
+    light: RenderedLight
     source: Literal["memory", "store", "render"]
     stored_as: str | None
     waited_s: float
@@ -110,33 +109,33 @@ class ObtainedRadiance:
             "result": "hit" if hit else "miss",
             "source": self.source,
             "object": self.stored_as,
-            "bytes": _content_bytes(self.image.rows, self.image.cols, self.image.grid.count),
+            "bytes": _bytes(self.light),
             "seconds": round(self.seconds, 4),
             "waited_s": round(self.waited_s, 4),
-            "saved_wall_s": round(self.statistics.wall_s, 4) if hit else 0.0,
-            "saved_cpu_s": round(self.statistics.cpu_s, 4) if hit else 0.0,
+            "saved_wall_s": round(self.light.statistics.wall_s, 4) if hit else 0.0,
+            "saved_cpu_s": round(self.light.statistics.cpu_s, 4) if hit else 0.0,
         }
 
 
-def obtain_radiance(
+def obtain_light(
     key: str,
-    render: Callable[[], Rendered],
+    render: Callable[[], RenderedLight],
     *,
-    shape: tuple[int, int, int],
-    memory: RadianceCache,
+    shapes: Shapes,
+    memory: LightCache,
     stages: StageStore | None = None,
     tick: Callable[[], None] = lambda: None,
-) -> ObtainedRadiance:
-    """Return the radiance image of a key from memory, from the object store, or from `render`, and keep it in both.
+) -> ObtainedLight:
+    """Return the light of a key from memory, from the object store, or from `render`, and keep it in both.
 
     Parameters
     ----------
     key
-        What decides the image's bytes: `radiance_key`.
+        What decides its bytes: `light_key`.
     render
-        Makes the image; its errors are passed on.
-    shape
-        (rows, cols, bands): an image that the store would not take is not waited for.
+        Makes the light; its errors are passed on.
+    shapes
+        Of the replicas and, where they are kept, of the bands: light that the store would not take is not waited for.
     stages
         The cache shared with other workers; None leaves it out.
     tick
@@ -144,15 +143,15 @@ def obtain_radiance(
     """
     started = time.perf_counter()
     waited_s = 0.0
-    if stages is not None and _content_bytes(*shape) > stages.max_bytes:
+    if stages is not None and _bytes_of_shapes(shapes) > stages.max_bytes:
         stages = None
-    stored_key = stored_radiance_key(key) if stages is not None else ""
+    stored_key = stored_light_key(key) if stages is not None else ""
 
-    def obtained(rendered: Rendered, source: Literal["memory", "store", "render"]) -> ObtainedRadiance:
+    def obtained(light: RenderedLight, source: Literal["memory", "store", "render"]) -> ObtainedLight:
         if source != "memory":
-            memory.put(key, *rendered)
+            memory.put(key, light)
         address = None if stages is None else stages.address(KIND, stored_key)
-        return ObtainedRadiance(*rendered, source, address, waited_s, time.perf_counter() - started)
+        return ObtainedLight(light, source, address, waited_s, time.perf_counter() - started)
 
     if (kept := memory.get(key)) is not None:
         if stages is not None:
@@ -160,15 +159,15 @@ def obtain_radiance(
         return obtained(kept, "memory")
     if stages is None:
         return obtained(render(), "render")
-    if (found := _read(stages, stored_key, shape)) is not None:
+    if (found := _read(stages, stored_key, shapes)) is not None:
         return obtained(found, "store")
     with stages.turn(KIND, stored_key, tick=tick) as turn:
         waited_s = turn.waited_s
         # Another worker may have finished between the look above and the lease, or while it was waited for.
-        if (found := _read(stages, stored_key, shape)) is not None:
+        if (found := _read(stages, stored_key, shapes)) is not None:
             return obtained(found, "store")
         rendered = render()
-        stages.put(KIND, stored_key, *encode_radiance(*rendered))
+        stages.put(KIND, stored_key, *encode_light(rendered))
         return obtained(rendered, "render")
 
 
@@ -177,36 +176,36 @@ def with_cache_steps(plan: FramePlan, frame: FrameDescription, stages: StageStor
     if not plan.radiance:
         return plan
     steps = []
-    for rig in frame.cameras:
-        key = stored_radiance_key(radiance_key(frame, rig, variant=choose_variant().variant))
+    for rig, light in zip(frame.cameras, plan.lights, strict=True):
+        key = stored_light_key(light_key(frame, rig, light, variant=choose_variant().variant))
         kept, address = stages.has(KIND, key), stages.address(KIND, key)
         why = f"kept as {address}: not rendered again" if kept else f"not kept yet; will be kept as {address}"
         steps.append(PlanStep(f"{rig.camera.name}: stage cache", "skip" if kept else "run", why))
     return replace(plan, steps=(*plan.steps, *steps))
 
 
-def _read(stages: StageStore, stored_key: str, shape: tuple[int, int, int]) -> Rendered | None:
+def _read(stages: StageStore, stored_key: str, shapes: Shapes) -> RenderedLight | None:
     content = stages.get(KIND, stored_key)
     if content is None:
         return None
     try:
-        image, statistics = decode_radiance(content)
-        if image.photons.shape != shape:
-            raise ValueError(f"its shape is {image.photons.shape}, not {shape}")
+        light = decode_light(content)
+        if _shapes(light) != shapes:
+            raise ValueError(f"its shapes are {_shapes(light)}, not {shapes}")
     except Exception as error:  # intact as an object, yet of no use: whatever it is, it must not fail the frame
         log.warning("unusable cache entry", key=stored_key, cause=str(error))
         stages.discard(KIND, stored_key)
         return None
-    return image, statistics
+    return light
 
 
-def stored_radiance_key(key: str) -> str:
-    """Return the key of an entry that outlives this process: beside the image's own key, who would compute it.
+def stored_light_key(key: str) -> str:
+    """Return the key of an entry that outlives this process: beside the light's own key, who would compute it.
 
     Another version of the rendering code, of the compiler or of the instruction set rounds otherwise, so it has entries of
     its own: a hit gives the bytes that rendering here would give.
     """
-    return digest_of({"radiance": key, "entry_version": _ENTRY_VERSION, "maker": _maker()})
+    return digest_of({"light": key, "entry_version": _ENTRY_VERSION, "maker": _maker()})
 
 
 @functools.cache
@@ -232,33 +231,34 @@ def _instruction_sets() -> list[str]:
     return [name for name in _INSTRUCTION_SETS if name in flags]
 
 
-def encode_radiance(image: RadianceImage, statistics: RenderStatistics) -> tuple[bytes | memoryview, ...]:
+def encode_light(light: RenderedLight) -> tuple[bytes | memoryview, ...]:
     """Return an exact encoding, in parts to be joined: length and JSON of the header, then the arrays as they are.
 
     Nothing is compressed: half of a Monte-Carlo image's bits are noise, and saving a fifth of the size costs twenty times
     the time of writing it. The header is padded, so that the arrays lie aligned.
     """
+    replicas, bands = _shapes(light)
     header = canonical_json(
         {
-            "shape": list(image.photons.shape),
-            "grid": [image.grid.first_nm, image.grid.last_nm, image.grid.step_nm],
-            "tangent_pitch": image.tangent_pitch,
-            "standard_error": image.standard_error is not None,
-            "statistics": asdict(statistics),
+            "replicas": list(replicas),
+            "bands": None if bands is None else list(bands),
+            "groups": list(light.groups),
+            "grid": [light.grid.first_nm, light.grid.last_nm, light.grid.step_nm],
+            "tangent_pitch": light.tangent_pitch,
+            "statistics": asdict(light.statistics),
         }
     )
     header += b" " * (-(_LENGTH.size + len(header)) % _ALIGNMENT)
-    arrays = [image.photons] if image.standard_error is None else [image.photons, image.standard_error]
-    return _LENGTH.pack(len(header)), header, *(_bytes_of(array) for array in arrays)
+    arrays = [light.replicas] if light.bands is None else [light.replicas, light.bands]
+    return _LENGTH.pack(len(header)), header, *(_view_of(array) for array in arrays)
 
 
-def decode_radiance(content: bytes | memoryview) -> Rendered:
+def decode_light(content: bytes | memoryview) -> RenderedLight:
     """Return what was encoded, bit for bit, in arrays of its own. Raises an error of any kind for other content."""
     content = memoryview(content)
     (length,) = _LENGTH.unpack_from(content)
     header = json.loads(bytes(content[_LENGTH.size : _LENGTH.size + length]))
-    rows, cols, bands = (int(count) for count in header["shape"])
-    shapes: list[tuple[int, ...]] = [(rows, cols, bands), *([(rows, cols)] if header["standard_error"] else [])]
+    shapes = [tuple(int(n) for n in header[name]) for name in ("replicas", "bands") if header[name] is not None]
     at = _LENGTH.size + length
     if len(content) != at + _FLOAT_BYTES * sum(math.prod(shape) for shape in shapes):
         raise ValueError(f"{len(content)} bytes do not hold arrays of the shapes {shapes}")
@@ -268,17 +268,31 @@ def decode_radiance(content: bytes | memoryview) -> Rendered:
         arrays.append(flat.reshape(shape).astype(np.float32))
         at += flat.nbytes
     first_nm, last_nm, step_nm = header["grid"]
-    error = arrays[1] if header["standard_error"] else None
-    image = RadianceImage(arrays[0], WavelengthGrid(first_nm, last_nm, step_nm), header["tangent_pitch"], error)
-    return image, RenderStatistics(**header["statistics"])
+    return RenderedLight(
+        replicas=arrays[0],
+        bands=arrays[1] if header["bands"] is not None else None,
+        groups=tuple(header["groups"]),
+        grid=WavelengthGrid(first_nm, last_nm, step_nm),
+        tangent_pitch=header["tangent_pitch"],
+        statistics=RenderStatistics(**header["statistics"]),
+    )
 
 
-def _bytes_of(array: NDArray[np.float32]) -> memoryview:
+def _view_of(array: NDArray[np.float32]) -> memoryview:
     if array.dtype != np.float32:
         raise TypeError(f"the array is {array.dtype}; must be float32")
-    return np.ascontiguousarray(array, dtype="<f4").data.cast("B")
+    contiguous = np.ascontiguousarray(array, dtype="<f4")
+    return contiguous.reshape(-1).view(np.uint8).data
 
 
-def _content_bytes(rows: int, cols: int, bands: int) -> int:
+def _shapes(light: RenderedLight) -> Shapes:
+    return light.replicas.shape, None if light.bands is None else light.bands.shape
+
+
+def _bytes(light: RenderedLight) -> int:
+    return _bytes_of_shapes(_shapes(light))
+
+
+def _bytes_of_shapes(shapes: Shapes) -> int:
     """Return the size of an entry's arrays."""
-    return _FLOAT_BYTES * rows * cols * (bands + 1)
+    return _FLOAT_BYTES * sum(math.prod(shape) for shape in shapes if shape is not None)

@@ -11,15 +11,15 @@ from fullwell.isp import develop
 from fullwell.isp import isetcam as isetcam_isp
 from fullwell.isp.model import DisplayImage
 from fullwell.isp.tone import encode_srgb
-from fullwell.optics import OpticsOptions, compute_irradiance
+from fullwell.optics import OpticsOptions, compute_irradiance, form_channel_image
 from fullwell.optics import isetcam as isetcam_optics
-from fullwell.radiometry import RadianceImage, Spectrum
+from fullwell.radiometry import ChannelRadiance, RadianceImage, Spectrum, WavelengthGrid
 from fullwell.scene.images import OpticalImage, RawImage
 from fullwell.schema.frame import CameraRig, SensorRig
-from fullwell.sensor import expose, fixed_pattern_stream
+from fullwell.sensor import ChannelCurrents, expose, fixed_pattern_stream
 from fullwell.sensor import isetcam as isetcam_sensor
 
-__all__ = ["develop_picture", "form_image", "take_picture"]
+__all__ = ["develop_picture", "form_channels", "form_image", "take_picture"]
 
 _ISETCAM_CORRECTION: dict[str, isetcam_isp.IlluminantCorrection] = {
     "none": "none",
@@ -38,9 +38,19 @@ def form_image(rig: CameraRig, radiance: RadianceImage, options: OpticsOptions) 
     return compute_irradiance(radiance, rig.camera.lens, options)
 
 
-def take_picture(rig: CameraRig, sensor: SensorRig, optical: OpticalImage, *, rng: np.random.Generator) -> RawImage:
+def form_channels(
+    rig: CameraRig, sensor: SensorRig, light: ChannelRadiance, grid: WavelengthGrid
+) -> tuple[ChannelCurrents, tuple[str, ...]]:
+    """Return what the sensor's channels count on the sensor plane, and notes for the manifest."""
+    image = form_channel_image(light, rig.camera.lens, rig.optics)
+    return ChannelCurrents(image.electrons, sensor.model.cfa, grid, image.sample_pitch_m), image.notes
+
+
+def take_picture(
+    rig: CameraRig, sensor: SensorRig, optical: OpticalImage | ChannelCurrents, *, rng: np.random.Generator
+) -> RawImage:
     """Return the raw image with all noise; `rng` is that of the frame, the fixed pattern is the sensor's own."""
-    if rig.model == "isetcam":
+    if rig.model == "isetcam" and isinstance(optical, OpticalImage):
         return isetcam_sensor.expose(optical, sensor.model, sensor.exposure, rng=rng)
     return expose(
         optical,

@@ -20,18 +20,20 @@ from fullwell.dataset.dng import check_dng_pattern, encode_raw_dng
 from fullwell.isp import scene_illuminant
 from fullwell.labels import Labels, labels_document, make_labels
 from fullwell.optics import OpticsOptions
-from fullwell.pipeline.cache import ObtainedRadiance, RadianceCache, obtain_radiance
-from fullwell.pipeline.camera_chain import develop_picture, form_image, take_picture
-from fullwell.pipeline.keys import frame_digest, radiance_key
+from fullwell.pipeline.cache import LightCache, ObtainedLight, obtain_light
+from fullwell.pipeline.camera_chain import develop_picture, form_channels, form_image, take_picture
+from fullwell.pipeline.keys import frame_digest, light_key
+from fullwell.pipeline.lighting import LightPlan
+from fullwell.pipeline.noise import SensorNoise
 from fullwell.pipeline.plan import FramePlan, plan_document, plan_frame
 from fullwell.pipeline.progress import CancelCheck, FrameProgress, ProgressCallback
 from fullwell.pipeline.stage_store import StageStore
-from fullwell.radiometry import RadianceImage
-from fullwell.render import RenderStatistics, choose_variant, query_surfaces, render_radiance
+from fullwell.render import RenderedLight, choose_variant, query_surfaces, render_light, tile_errors
 from fullwell.scene import Camera, Film
 from fullwell.scene.images import OpticalImage, RawImage
 from fullwell.schema.frame import CameraRig, FrameDescription, SensorRig
-from fullwell.sensor import SensorModel, dark_noise_e, reference_model
+from fullwell.sensor import ChannelCurrents, SensorModel
+from fullwell.sensor.exposures import FixedExposure
 from fullwell.storage import ObjectStore
 
 __all__ = ["MANIFEST_NAME", "MANIFEST_SCHEMA", "render_frame"]
@@ -47,14 +49,17 @@ def render_frame(
     store: ObjectStore,
     prefix: str,
     *,
-    cache: RadianceCache | None = None,
+    cache: LightCache | None = None,
     stages: StageStore | None = None,
+    skip: bool = True,
     progress: ProgressCallback | None = None,
     should_cancel: CancelCheck | None = None,
 ) -> dict[str, Any]:
     """Make the products that a frame asks for, publish them under `prefix`, and return the manifest.
 
-    Radiance images are taken from `cache` (memory) and `stages` (shared with other workers) and kept in both.
+    Rendered light is taken from `cache` (memory) and `stages` (shared with other workers) and kept in both.
+
+    With `skip` false the planner leaves nothing out, to see what its skips change.
 
     A frame that is published already is returned at once, so running twice does nothing twice. Products are complete before
     the manifest appears; what a crash leaves behind is products without a manifest, which nobody reads and the next run
@@ -74,7 +79,7 @@ def render_frame(
     if published is not None:
         return published
     _check_products(frame)
-    run = _Run(frame, plan_frame(frame), cache or RadianceCache(), stages, progress, should_cancel)
+    run = _Run(frame, plan_frame(frame, skip=skip), cache or LightCache(), stages, progress, should_cancel)
     for position, rig in enumerate(frame.cameras):
         _camera_products(run, rig, position)
     run.report("store", 0.98)
@@ -125,7 +130,7 @@ class _Run:
 
     frame: FrameDescription
     plan: FramePlan
-    cache: RadianceCache
+    cache: LightCache
     stage_store: StageStore | None
     progress: ProgressCallback | None
     should_cancel: CancelCheck | None
@@ -176,24 +181,60 @@ def _camera_products(run: _Run, rig: CameraRig, position: int) -> None:
         "camera_to_world": rig.camera.camera_to_world.tolist(),
         "sensors": [],
     }
-    images: tuple[RadianceImage, OpticalImage] | None = None
+    images: _Images | None = None
     if plan.radiance:
-        radiance, statistics, key = _radiance(run, rig, base, share * _RENDER_SHARE)
-        document["radiance"] = _radiance_document(radiance, statistics, key)
-        _add(run, f"{folder}radiance.exr", lambda: encode.encode_radiance_exr(radiance))
-        if plan.optics:
-            run.report("optics", base + share * _RENDER_SHARE)
-            with run.stage(f"{name}: optics"):
-                optical = form_image(rig, radiance, _optics_options(run, rig))
-            run.notes.extend(f"{name}: {note}" for note in optical.notes)
-            _add(run, f"{folder}irradiance.exr", lambda: encode.encode_irradiance_exr(optical))
-            images = (radiance, optical)
+        images = _rendered(run, rig, plan.lights[position], folder, (base, share * _RENDER_SHARE))
+        document["radiance"] = _radiance_document(images, frame)
     for number, sensor in enumerate(rig.sensors):
         part = (number + 0.5) / len(rig.sensors)
         run.report("sensor and labels", base + share * (_RENDER_SHARE + (1 - _RENDER_SHARE) * part))
         inner = f"{folder}{sensor.name}/" if len(rig.sensors) > 1 else folder
         document["sensors"].append(_sensor_products(run, rig, sensor, inner, images))
     run.cameras.append(document)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Images:
+    """What a camera's sensors look at: the light, and what the optics made of it, by bands or by each sensor's channels."""
+
+    light: RenderedLight
+    key: str
+    plan: LightPlan
+    optical: OpticalImage | None
+    currents: dict[str, ChannelCurrents]
+
+    def of(self, sensor: SensorRig) -> OpticalImage | ChannelCurrents | None:
+        """Return the light on a sensor."""
+        return self.currents.get(sensor.name, self.optical)
+
+
+def _rendered(run: _Run, rig: CameraRig, plan: LightPlan, folder: str, span: tuple[float, float]) -> _Images:
+    """Render a camera's light, form its images, and add the products made of them.
+
+    `span` is the start and the length of the rendering in the frame's progress.
+    """
+    name, outputs, weights = rig.camera.name, run.frame.outputs, dict(run.frame.group_weights)
+    light, key = _light(run, rig, plan, *span)
+    optical, currents = None, {}
+    spectral = run.plan.optics and (not plan.channels or "irradiance.exr" in outputs)
+    if spectral or "radiance.exr" in outputs:
+        radiance = light.radiance(weights)
+        _add(run, f"{folder}radiance.exr", lambda: encode.encode_radiance_exr(radiance))
+        if spectral:
+            run.report("optics", sum(span))
+            with run.stage(f"{name}: optics"):
+                optical = form_image(rig, radiance, _optics_options(run, rig))
+            run.notes.extend(f"{name}: {note}" for note in optical.notes)
+            _add(run, f"{folder}irradiance.exr", lambda: encode.encode_irradiance_exr(optical))
+    if run.plan.sensor and plan.channels:
+        run.report("optics", sum(span))
+        with run.stage(f"{name}: optics"):
+            seen = light.channels(weights)
+            for sensor in rig.sensors:
+                part = plan.light_of(sensor, seen, light.tangent_pitch)
+                currents[sensor.name], notes = form_channels(rig, sensor, part, run.frame.grid)
+                run.notes.extend(f"{name}/{sensor.name}: {note}" for note in notes)
+    return _Images(light, key, plan, optical, currents)
 
 
 def _optics_options(run: _Run, rig: CameraRig) -> OpticsOptions:
@@ -211,28 +252,25 @@ def _add(run: _Run, name: str, encoder: Any) -> None:
             run.products[name] = encoder()
 
 
-def _radiance(run: _Run, rig: CameraRig, base: float, share: float) -> tuple[RadianceImage, RenderStatistics, str]:
+def _light(run: _Run, rig: CameraRig, plan: LightPlan, base: float, share: float) -> tuple[RenderedLight, str]:
     frame, name, film = run.frame, rig.camera.name, rig.camera.film
-    key = radiance_key(frame, rig, variant=choose_variant().variant)
+    key = light_key(frame, rig, plan, variant=choose_variant().variant)
 
-    def render() -> tuple[RadianceImage, RenderStatistics]:
+    def render() -> RenderedLight:
         run.report("render", base)
         with run.stage(f"{name}: render"):
-            return render_radiance(
-                frame.scene,
+            return render_light(
+                plan.scene,
                 rig.camera,
-                frame.grid,
-                samples_per_pixel=frame.quality.samples_per_pixel,
-                max_depth=frame.quality.max_depth,
-                seed=seed32(frame.seed, "radiance", key),
+                replace(plan.request, seed=seed32(frame.seed, "light", key)),
                 progress=lambda fraction: run.report("render", base + share * fraction),
                 should_cancel=run.should_cancel,
             )
 
-    obtained = obtain_radiance(
+    obtained = obtain_light(
         key,
         render,
-        shape=(film.rows, film.cols, frame.grid.count),
+        shapes=plan.shapes(film),
         memory=run.cache,
         stages=run.stage_store,
         tick=lambda: run.report("wait for another worker", base),
@@ -240,23 +278,48 @@ def _radiance(run: _Run, rig: CameraRig, base: float, share: float) -> tuple[Rad
     run.cached.append({"camera": name, "key": key, **obtained.document()})
     if obtained.source != "render":
         run.notes.append(_reuse_note(name, key, obtained))
-    return obtained.image, obtained.statistics, key
+    statistics = obtained.light.statistics
+    if statistics.unmet_tiles:
+        run.notes.append(
+            f"{name}: the noise target is not met in {statistics.unmet_tiles} of {statistics.tiles} tiles (stopped by "
+            f"{statistics.stopped_by}); the worst has {statistics.noise_ratio_max:.3g} times the sensor's noise"
+        )
+    return obtained.light, key
 
 
-def _reuse_note(camera: str, key: str, obtained: ObtainedRadiance) -> str:
+def _reuse_note(camera: str, key: str, obtained: ObtainedLight) -> str:
     source = "an earlier frame of this run" if obtained.source == "memory" else "the stage cache"
-    return f"{camera}: radiance reused from {source} (key {key[:12]}); rendering it took {obtained.statistics.wall_s:.3g} s"
+    return f"{camera}: light reused from {source} (key {key[:12]}); rendering it took {obtained.light.statistics.wall_s:.3g} s"
 
 
-def _radiance_document(image: RadianceImage, statistics: RenderStatistics, key: str) -> dict[str, Any]:
-    error = image.standard_error
+def _radiance_document(images: _Images, frame: FrameDescription) -> dict[str, Any]:
+    """Return what was rendered, and how exact it is; all of it the same wherever the frame is made."""
+    light = images.light
+    statistics = light.statistics
+    error = light.channel_error(dict(frame.group_weights))
+    mean = light.channels(dict(frame.group_weights))
+    relative = np.divide(error, mean, out=np.zeros_like(error), where=mean > 0)
     return {
-        "key": key,
+        "key": images.key,
         "variant": statistics.variant,
-        "samples_per_pixel": statistics.samples_per_pixel,
+        "groups": list(light.groups),
+        "bands": light.bands is not None,
+        "samples_per_pixel": round(statistics.samples_per_pixel, 3),
+        "samples_min": statistics.samples_min,
+        "samples_max": statistics.samples_max,
         "passes": statistics.passes,
+        "segments": statistics.segments,
         "bad_samples": statistics.bad_samples,
-        "relative_standard_error_rms": None if error is None else float(np.sqrt(np.mean(np.square(error, dtype=np.float64)))),
+        "clamped_fraction": statistics.clamped_fraction,
+        "relative_standard_error_rms": float(np.sqrt(np.mean(np.square(relative)))) if relative.size else None,
+        "noise_target": {
+            "noise_ratio": frame.quality.noise_ratio,
+            "predicted_rms": statistics.noise_ratio_rms,
+            "predicted_max": statistics.noise_ratio_max,
+            "tiles": statistics.tiles,
+            "unmet_tiles": statistics.unmet_tiles,
+            "stopped_by": statistics.stopped_by,
+        },
     }
 
 
@@ -265,7 +328,7 @@ def _sensor_products(
     rig: CameraRig,
     sensor: SensorRig,
     folder: str,
-    images: tuple[RadianceImage, OpticalImage] | None,
+    images: _Images | None,
 ) -> dict[str, Any]:
     view = _sensor_view(rig.camera, sensor.model)
     document: dict[str, Any] = {
@@ -276,10 +339,10 @@ def _sensor_products(
         "intrinsics_px": view.intrinsics_px.tolist(),
         "lens": _lens_document(rig.camera),
     }
-    if run.plan.sensor and images is not None:
-        radiance, optical = images
-        raw = _expose(run, rig, sensor, optical)
-        document |= _raw_document(raw, sensor.model, radiance)
+    seen = images.of(sensor) if run.plan.sensor and images is not None else None
+    if seen is not None and images is not None:
+        raw = _expose(run, rig, sensor, seen)
+        document |= _raw_document(raw, sensor.model) | _noise_document(run.frame, rig, sensor, images, raw)
         _add(run, f"{folder}raw.npz", lambda: encode.encode_raw_npz(raw))
         _add(run, f"{folder}raw.tiff", lambda: encode.encode_raw_tiff(raw))
         light = scene_illuminant(run.frame.scene, rig.camera) if sensor.isp.illuminant is None else None
@@ -302,14 +365,14 @@ def _sensor_view(camera: Camera, model: SensorModel) -> Camera:
     return Camera(camera.name, camera.camera_to_world, camera.lens, Film(model.rows, model.cols, model.pixel_pitch_m))
 
 
-def _expose(run: _Run, rig: CameraRig, sensor: SensorRig, optical: OpticalImage) -> RawImage:
+def _expose(run: _Run, rig: CameraRig, sensor: SensorRig, seen: OpticalImage | ChannelCurrents) -> RawImage:
     with run.stage(f"{rig.camera.name}/{sensor.name}: sensor"):
         rng = stream(run.frame.seed, "sensor", run.frame.index, rig.camera.name, sensor.name)
-        return take_picture(rig, sensor, optical, rng=rng)
+        return take_picture(rig, sensor, seen, rng=rng)
 
 
-def _raw_document(raw: RawImage, model: SensorModel, radiance: RadianceImage) -> dict[str, Any]:
-    """Return what the capture was, and the Monte-Carlo error in units of the sensor's own noise."""
+def _raw_document(raw: RawImage, model: SensorModel) -> dict[str, Any]:
+    """Return what the capture was."""
     document: dict[str, Any] = {
         "exposure_time_s": raw.exposure_time_s,
         "adc_bits": raw.adc_bits,
@@ -326,14 +389,22 @@ def _raw_document(raw: RawImage, model: SensorModel, radiance: RadianceImage) ->
     if raw.captures:
         document["captures"] = [dataclasses.asdict(record) for record in raw.captures]
     if raw.mean_electrons is not None:
-        mean_e = raw.mean_electrons.astype(np.float64)
-        document["mean_electrons"] = float(mean_e.mean())
-        if radiance.standard_error is not None and radiance.standard_error.shape == mean_e.shape:
-            noise_e = np.sqrt(mean_e + dark_noise_e(reference_model(model)) ** 2)
-            monte_carlo_e = radiance.standard_error * mean_e
-            ratio = np.divide(monte_carlo_e, noise_e, out=np.zeros_like(mean_e), where=noise_e > 0)
-            document["noise_ratio_rms"] = float(np.sqrt(np.mean(ratio**2)))
+        document["mean_electrons"] = float(raw.mean_electrons.mean(dtype=np.float64))
     return document
+
+
+def _noise_document(
+    frame: FrameDescription, rig: CameraRig, sensor: SensorRig, images: _Images, raw: RawImage
+) -> dict[str, Any]:
+    """Return the Monte-Carlo error of this very picture in units of the sensor's own noise, over tiles."""
+    places = images.plan.channels.get(sensor.name)
+    if places is None:
+        return {}
+    weights = images.light.weights(dict(frame.group_weights))
+    longest = raw.exposure_time_s
+    target = SensorNoise(rig, ((replace(sensor, exposure=FixedExposure(longest)), places),), lambda *_: longest)
+    errors = tile_errors(images.light.replicas, [(weights, target)])
+    return {"noise_ratio_rms": errors.rms, "noise_ratio_max": float(errors.ratio.max())}
 
 
 def _shutter_document(raw: RawImage) -> dict[str, Any]:

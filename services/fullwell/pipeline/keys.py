@@ -5,37 +5,38 @@ from __future__ import annotations
 import importlib.metadata
 
 from fullwell.core.hashing import digest_of
+from fullwell.pipeline.lighting import LightPlan
 from fullwell.schema.frame import CameraRig, FrameDescription
 
-__all__ = ["KEY_SCHEMA", "frame_digest", "radiance_key"]
+__all__ = ["KEY_SCHEMA", "frame_digest", "light_key"]
 
 KEY_SCHEMA = 1
-_RADIANCE_VERSION = 1
+_RADIANCE_VERSION = 2
 """Raise it when the same recipe gives other radiances."""
 
 
-def radiance_key(frame: FrameDescription, rig: CameraRig, *, variant: str) -> str:
-    """Return the key of a camera's radiance image: all that decides its bytes, and nothing else.
+def light_key(frame: FrameDescription, rig: CameraRig, plan: LightPlan, *, variant: str) -> str:
+    """Return the key of a camera's rendered light: all that decides its bytes, and nothing else.
 
-    Two lenses that differ only in transmittance, or two pinholes that differ only in f-number, share their radiance; the
-    index of the frame plays no part, so frames that vary only the sensor render once.
+    The index of the frame plays no part, and what frames of a recipe vary of sensors and weights of light groups is in the
+    plan of all of them alike, so frames that vary only that render once.
     """
     camera, lens = rig.camera, rig.camera.lens
     thin = lens.kind == "thin_lens"
     return digest_of(
         {
             "key_schema": KEY_SCHEMA,
-            "stage": "radiance",
+            "stage": "light",
             "version": _RADIANCE_VERSION,
             "renderer": importlib.metadata.version("mitsuba"),
             "variant": variant,
-            "scene": {"objects": frame.scene.objects, "lights": frame.scene.lights},
+            "scene": {"objects": plan.scene.objects, "lights": plan.scene.lights},
             "pose": camera.camera_to_world,
             "film": [camera.film.rows, camera.film.cols, camera.tangent_pitch],
             "pupil_m": lens.pupil_diameter_m if thin else 0.0,
             "focus_m": lens.focus_distance_m if thin else 0.0,
             "grid": frame.grid,
-            "quality": frame.quality,
+            "plan": plan.identity,
             "seed": frame.seed,
         }
     )

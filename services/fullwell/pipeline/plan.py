@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 from fullwell.optics import MAX_SKIPPED_CONTRAST_LOSS, nyquist_contrast_loss, working_f_number
-from fullwell.scene import Dielectric
+from fullwell.pipeline.lighting import LightPlan, plan_light
+from fullwell.pipeline.steps import PlanStep
 from fullwell.schema.frame import CameraRig, FrameDescription
 
 __all__ = ["FramePlan", "PlanStep", "plan_document", "plan_frame"]
@@ -19,16 +20,6 @@ _LABELS = frozenset({"depth.exr", "normals.exr", "instances.png", "semantic.png"
 
 
 @dataclass(frozen=True, slots=True)
-class PlanStep:
-    """One decision: what it is about, run or skip, the reason, and the bound on the error that a skip may cause."""
-
-    what: str
-    decision: Literal["run", "skip"]
-    why: str
-    error_bound: str = "none"
-
-
-@dataclass(frozen=True, slots=True)
 class FramePlan:
     """The decisions of a frame, and the switches that the runner follows."""
 
@@ -38,10 +29,12 @@ class FramePlan:
     sensor: bool
     display: bool
     labels: bool
+    lights: tuple[LightPlan, ...] = ()
+    """What is rendered for each camera; empty where nothing is."""
 
 
-def plan_frame(frame: FrameDescription) -> FramePlan:
-    """Return the plan of a frame from its description alone; nothing is rendered."""
+def plan_frame(frame: FrameDescription, *, skip: bool = True) -> FramePlan:
+    """Return the plan of a frame from its description alone; nothing is rendered. With `skip` false nothing is left out."""
     wanted = frozenset(frame.outputs)
     stages = {
         "radiance": _RADIANCE,
@@ -58,23 +51,19 @@ def plan_frame(frame: FrameDescription) -> FramePlan:
             steps.append(PlanStep(name, "run", f"for {', '.join(needed)}"))
         else:
             steps.append(PlanStep(name, "skip", "no output asks for it"))
-    for rig in frame.cameras:
+    lights = []
+    for position, rig in enumerate(frame.cameras):
+        if switches["radiance"]:
+            lights.append(plan_light(frame, rig, position, skip=skip))
+            steps.extend(lights[-1].steps)
         steps.extend(_camera_steps(frame, rig, switches["radiance"], switches["optics"]))
-    return FramePlan(steps=tuple(steps), **switches)
+    return FramePlan(steps=tuple(steps), lights=tuple(lights), **switches)
 
 
 def _camera_steps(frame: FrameDescription, rig: CameraRig, radiance: bool, optics: bool) -> list[PlanStep]:
     camera = rig.camera
     steps = []
     if radiance:
-        size = f"{camera.film.cols} x {camera.film.rows}"
-        samples = frame.quality.samples_per_pixel
-        bands = f"{frame.grid.count} bands, {frame.grid.first_nm:g}-{frame.grid.last_nm:g} nm"
-        steps.append(PlanStep(f"{camera.name}: render", "run", f"{size} samples, {samples} rays each, {bands}"))
-        depth = frame.quality.max_depth
-        glass = any(isinstance(part.material, Dielectric) for item in frame.scene.objects for part in item.parts)
-        why = "glass in the scene" if glass else "no glass in the scene"
-        steps.append(PlanStep(f"{camera.name}: paths", "run", f"up to {depth} segments ({why})", "paths that are longer"))
         if rig.depth_layers:
             what = f"{camera.name}: depth of field"
             steps.append(PlanStep(what, "run", f"layers by depth at f/{camera.lens.f_number:g}", "half a pixel of blur"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from fullwell.pipeline.cache import RadianceCache
+from fullwell.pipeline.cache import LightCache
 from fullwell.pipeline.frame import render_frame
 from fullwell.pipeline.progress import CancelCheck, FrameProgress, ProgressCallback
 from fullwell.pipeline.stage_store import StageStore
@@ -14,7 +14,7 @@ from fullwell.storage import ObjectStore
 
 __all__ = ["run_frame"]
 
-_process_cache = RadianceCache()
+_process_cache = LightCache()
 """One per process: successive frames of a job that share their radiance render once."""
 
 

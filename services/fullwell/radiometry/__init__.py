@@ -9,7 +9,7 @@ from fullwell.radiometry.illuminants import (
     illuminant_names,
     planck_radiance,
 )
-from fullwell.radiometry.images import RadianceImage
+from fullwell.radiometry.images import ChannelRadiance, RadianceImage
 from fullwell.radiometry.metals import metal, metal_names, normal_reflectance
 from fullwell.radiometry.photometry import (
     chromaticity,
@@ -40,6 +40,7 @@ __all__ = [
     "DEFAULT_GRID",
     "MAX_WAVELENGTH_NM",
     "MIN_WAVELENGTH_NM",
+    "ChannelRadiance",
     "RadianceImage",
     "SkyRadiance",
     "Spectrum",

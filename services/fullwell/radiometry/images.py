@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fullwell.core.errors import FieldError, ShapeError
 from fullwell.radiometry.grid import WavelengthGrid
 
-__all__ = ["RadianceImage"]
+__all__ = ["ChannelRadiance", "RadianceImage"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,3 +60,40 @@ class RadianceImage:
     def cols(self) -> int:
         """Number of columns."""
         return int(self.photons.shape[1])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ChannelRadiance:
+    """Light seen through the entrance pupil as a sensor's channels count it, on the samples of a `RadianceImage`.
+
+    Attributes
+    ----------
+    electrons
+        (parts, rows, cols) float64 [e- s^-1 m^-2 sr^-1]: radiance times quantum efficiency, filters and the lens's
+        transmittance, integrated over the wavelengths of each part of each channel.
+    wavelength_nm
+        (parts,) mean wavelength of what each part counts [nm], for what depends on it.
+    channel
+        (parts,) number of the channel that each part belongs to; a channel is the sum of its parts.
+    tangent_pitch
+        As in `RadianceImage`.
+    """
+
+    electrons: NDArray[np.float64]
+    wavelength_nm: NDArray[np.float64]
+    channel: NDArray[np.intp]
+    tangent_pitch: float
+
+    def __post_init__(self) -> None:
+        parts = self.electrons.shape[:1]
+        if self.electrons.ndim != 3 or self.wavelength_nm.shape != parts or self.channel.shape != parts:
+            raise ShapeError(
+                f"electrons has shape {self.electrons.shape}, wavelength_nm {self.wavelength_nm.shape} and channel "
+                f"{self.channel.shape}; must be (parts, rows, cols) and (parts,)."
+            )
+        if not 0 < self.tangent_pitch < math.inf:
+            raise FieldError(
+                f"tangent_pitch is {self.tangent_pitch}; must be finite and > 0.",
+                path="tangent_pitch",
+                value=self.tangent_pitch,
+            )

@@ -4,9 +4,11 @@ from fullwell.render.adaptive import NoiseTarget, SamplingGoal, tile_errors
 from fullwell.render.light import LightRequest, RenderedLight, RenderStatistics, render_light
 from fullwell.render.radiance import render_radiance
 from fullwell.render.surfaces import query_surfaces
+from fullwell.render.transport.progressive import REPLICAS
 from fullwell.render.variant import VariantChoice, activate, choose_variant
 
 __all__ = [
+    "REPLICAS",
     "LightRequest",
     "NoiseTarget",
     "RenderStatistics",

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["NoiseTarget", "Sampler", "SamplingGoal", "SamplingOutcome", "TileErrors", "sample_until", "tile_errors"]
+__all__ = ["NoiseTarget", "Sampler", "SamplingGoal", "SamplingOutcome", "TileErrors", "Views", "sample_until", "tile_errors"]
 
 TILE = 8
 """Side of a tile in film samples: 64 pixels tell the error to a few per cent, and are small enough to follow shadows."""
@@ -26,12 +26,23 @@ _SAFETY = 1.05
 
 
 class NoiseTarget(Protocol):
-    """What error of the light the sensor would not notice."""
+    """What error of the light the sensors would not notice."""
+
+    def channels(self, light: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return (..., channels, rows, cols): what the sensors' channels count of (..., responses, rows, cols) of light."""
+        ...
 
     def __call__(self, channels: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the noise variance of the sensor, expressed as light, for (channels, rows, cols) of light so far; inf where
-        nothing depends on it."""
+        """Return the noise variance of the sensors, expressed as light, for (channels, rows, cols) of light so far."""
         ...
+
+    def saturation(self, light: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return (responses,) the light that saturates a pixel on the axis; inf where no sensor has the response."""
+        ...
+
+
+Views = Sequence[tuple[NDArray[np.float64], NoiseTarget]]
+"""(groups,) weights of the light groups, and the sensors that look at the light so weighted."""
 
 
 class Sampler(Protocol):
@@ -49,6 +60,10 @@ class Sampler(Protocol):
         """Return the replicas' means, (replicas, groups, channels, rows, cols)."""
         ...
 
+    def restart(self, clamp: NDArray[np.float64]) -> None:
+        """Forget all samples; from now on clamp each to `clamp`, (channels,) of light."""
+        ...
+
 
 @dataclass(frozen=True, slots=True)
 class SamplingGoal:
@@ -64,12 +79,15 @@ class SamplingGoal:
         Cap of an adaptive run.
     time_limit_s
         Wall time after which no further round begins; None for none. With it, results depend on the machine.
+    clamp_saturation
+        Clamp of single samples, in lights that saturate a pixel; None for none.
     """
 
     noise_ratio: float | None = 0.5
     samples_per_pixel: int = 64
     max_samples_per_pixel: int = 4096
     time_limit_s: float | None = None
+    clamp_saturation: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,54 +128,61 @@ class SamplingOutcome:
     rounds: int
 
 
-def tile_errors(replicas: NDArray[np.floating], target: NoiseTarget, group_weights: NDArray[np.float64]) -> TileErrors:
-    """Return the error of the light over the sensor's noise, by tile.
+def tile_errors(replicas: NDArray[np.floating], views: Views) -> TileErrors:
+    """Return the error of the light over the sensors' noise, by tile, of the worst view and channel.
 
     Parameters
     ----------
     replicas
-        (replicas, groups, channels, rows, cols): independent estimates of the light.
-    group_weights
-        (groups,) how much of each light group the picture has.
+        (replicas, groups, responses, rows, cols): independent estimates of the light.
     """
-    light = np.tensordot(replicas.astype(np.float64), group_weights, axes=(1, 0))
+    worst: NDArray[np.float64] | None = None
+    for weights, target in views:
+        square = _tile_squares(np.tensordot(replicas.astype(np.float64), weights, axes=(1, 0)), target)
+        worst = square if worst is None else np.maximum(worst, square)
+    if worst is None:
+        raise ValueError("there is no view to judge the error by")
+    return TileErrors(np.sqrt(worst), float(np.sqrt(worst.mean())))
+
+
+def _tile_squares(light: NDArray[np.float64], target: NoiseTarget) -> NDArray[np.float64]:
+    """Return (tile rows, tile cols) variance of the error over that of the noise, of the worst channel."""
+    light = target.channels(light)
     count = len(light)
     mean = light.mean(axis=0)
     variance = ((light - mean) ** 2).sum(axis=0) / (count * (count - 1))
     # Averages over a tile of the error and of the noise, not of their ratio: one pixel that happens to be dark is no outlier.
-    noise = target(mean)
-    known = np.isfinite(noise)
-    pooled_error, pooled_noise = _tile_sums(np.where(known, variance, 0.0)), _tile_sums(np.where(known, noise, 0.0))
-    square = np.divide(pooled_error, pooled_noise, out=np.zeros_like(pooled_error), where=pooled_noise > 0)
-    square[(pooled_noise <= 0) & (pooled_error > 0)] = np.inf
-    worst = square.max(axis=0) if len(square) else np.zeros(square.shape[1:])
-    return TileErrors(np.sqrt(worst), float(np.sqrt(worst.mean())))
+    error, noise = _tile_sums(variance), _tile_sums(target(mean))
+    square = np.divide(error, noise, out=np.zeros_like(error), where=noise > 0)
+    square[(noise <= 0) & (error > 0)] = np.inf
+    return np.asarray(square.max(axis=0))
 
 
 def sample_until(
     image: Sampler,
     goal: SamplingGoal,
-    target: NoiseTarget | None,
+    views: Views,
     *,
-    group_weights: NDArray[np.float64],
     report: Callable[[float], None],
     replicas: int,
 ) -> SamplingOutcome:
-    """Take samples until the goal is reached, and say how far it was."""
+    """Take samples until the goal is reached in every view, and say how far it was; without views, equal samples."""
     started = time.perf_counter()
     everything = np.arange(image.rows * image.cols, dtype=np.int64)
     tiles_shape = (-(-image.rows // TILE), -(-image.cols // TILE))
     report(0.0)
-    if goal.noise_ratio is None or target is None:
+    if goal.clamp_saturation is not None and views:
+        _set_clamp(image, goal.clamp_saturation, views, everything)
+    if goal.noise_ratio is None or not views:
         count = -(-goal.samples_per_pixel // replicas)
         image.add(everything, np.full(len(everything), count), report)
-        errors = None if target is None else tile_errors(image.replicas(), target, group_weights)
+        errors = tile_errors(image.replicas(), views) if views else None
         return _outcome(image, errors, tiles_shape, replicas=replicas, unmet=0, stopped_by="samples", rounds=1)
     cap = max(1, goal.max_samples_per_pixel // replicas)
     image.add(everything, np.full(len(everything), min(_FIRST_SAMPLES, cap)), lambda f: report(0.1 * f))
     rounds, done = 1, 0.1
     while True:
-        errors = tile_errors(image.replicas(), target, group_weights)
+        errors = tile_errors(image.replicas(), views)
         so_far = image.counts.reshape(image.rows, image.cols)[::TILE, ::TILE]
         more = _more_samples(errors.ratio, so_far, goal.noise_ratio, cap)
         late = goal.time_limit_s is not None and time.perf_counter() - started > goal.time_limit_s
@@ -169,6 +194,14 @@ def sample_until(
         base, share = done, (1.0 - done) * 0.6
         image.add(everything, by_pixel, lambda f, base=base, share=share: report(base + share * f))  # type: ignore[misc]
         done, rounds = base + share, rounds + 1
+
+
+def _set_clamp(image: Sampler, saturation: float, views: Views, everything: NDArray[np.int64]) -> None:
+    """Look at the light once, find from it what saturates a pixel, and begin anew with samples clamped to that."""
+    image.add(everything, np.full(len(everything), 1), lambda _: None)
+    mean = image.replicas().astype(np.float64).mean(axis=0)
+    limits = [target.saturation(np.tensordot(weights, mean, axes=(0, 0))) for weights, target in views]
+    image.restart(saturation * np.max(limits, axis=0))
 
 
 def _more_samples(ratio: NDArray[np.float64], so_far: NDArray[np.int64], wanted: float, cap: int) -> NDArray[np.int64]:

@@ -33,6 +33,8 @@ class RenderStatistics:
         Rounds of sampling.
     bad_samples, segments
         Samples that were no numbers and count as black; rays between two surfaces that were traced.
+    clamped_fraction
+        Share of the channels' light that a clamp of single samples took away; 0 without one.
     wall_s, cpu_s
         Time, all threads' for `cpu_s`.
     variant
@@ -57,6 +59,7 @@ class RenderStatistics:
     tiles: int = 0
     unmet_tiles: int = 0
     stopped_by: str = "samples"
+    clamped_fraction: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,15 +74,13 @@ class LightRequest:
         Electrons per photon of each channel that is kept directly, filters and the lens's transmittance included.
     keep_bands, keep_groups
         Whether spectral bands are kept too, and whether each light group has its own image.
-    group_weights
-        Factor of each light group's light in the picture that the goal is about, by name; 1 for those left out. For groups
-        that are kept apart.
     group_importance
         Factor by which the lamps of a group are sampled more often, by name; 1 for those left out.
     max_depth
         Segments of the longest path: 1 shows emitters only, 2 adds direct light, and so on.
-    goal, target
-        When to stop, and what noise the sensor itself has; without a target every pixel gets equal samples.
+    goal, targets
+        When to stop, and what noise the sensors have: (weights of light groups by name, noise) for each way in which they look
+        at the light; groups left out have weight 1. Without any, every pixel gets equal samples.
     seed
         The same seed gives the same bytes, for any number of threads.
     """
@@ -88,11 +89,10 @@ class LightRequest:
     responses: tuple[Spectrum, ...] = ()
     keep_bands: bool = True
     keep_groups: bool = False
-    group_weights: tuple[tuple[str, float], ...] = ()
     group_importance: tuple[tuple[str, float], ...] = ()
     max_depth: int = 8
     goal: SamplingGoal = field(default_factory=SamplingGoal)
-    target: NoiseTarget | None = None
+    targets: tuple[tuple[tuple[tuple[str, float], ...], NoiseTarget], ...] = ()
     seed: int = 0
 
 
@@ -124,7 +124,7 @@ class RenderedLight:
 
     def weights(self, by_name: Mapping[str, float]) -> NDArray[np.float64]:
         """Return (groups,) factors; 1 for groups that are not named."""
-        return np.array([float(by_name.get(name, 1.0)) for name in self.groups])
+        return _weights(self.groups, by_name)
 
     def channels(self, by_name: Mapping[str, float]) -> NDArray[np.float64]:
         """Return (channels, rows, cols) [e- s^-1 m^-2 sr^-1] with the groups weighted."""
@@ -198,9 +198,8 @@ def render_light(
     report = Reporter(progress, should_cancel)
     try:
         image = ProgressiveImage(mi, work) if mi.variant().startswith("llvm") else ScalarImage(mi, work)
-        by_name = dict(request.group_weights)
-        weights = np.array([by_name.get(name, 1.0) for name in image.groups])
-        outcome = sample_until(image, request.goal, request.target, group_weights=weights, report=report, replicas=REPLICAS)
+        views = [(_weights(image.groups, dict(by_name)), target) for by_name, target in request.targets]
+        outcome = sample_until(image, request.goal, views, report=report, replicas=REPLICAS)
         image.check()
         light = RenderedLight(
             replicas=image.replicas(),
@@ -215,6 +214,10 @@ def render_light(
     except Exception as error:
         raise RenderError(f"the renderer failed: {_cause(error)}") from error
     return light
+
+
+def _weights(groups: tuple[str, ...], by_name: Mapping[str, float]) -> NDArray[np.float64]:
+    return np.array([float(by_name.get(name, 1.0)) for name in groups])
 
 
 def _cause(error: BaseException) -> BaseException:
@@ -242,4 +245,5 @@ def _statistics(
         tiles=outcome.tiles,
         unmet_tiles=outcome.unmet_tiles,
         stopped_by=outcome.stopped_by,
+        clamped_fraction=image.clamped_fraction,
     )

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fullwell.core.constants import NM_PER_M, PLANCK_J_S, SPEED_OF_LIGHT_M_PER_S
+from fullwell.core.errors import RenderError
 from fullwell.core.rng import seed32
 from fullwell.radiometry import WavelengthGrid
 from fullwell.render.translate import translate
-from fullwell.render.transport.progressive import REPLICAS, Work, check_samples, light_groups
+from fullwell.render.transport.progressive import REPLICAS, Work, check_samples
 from fullwell.scene import Camera, SceneDescription
+from fullwell.scene.groups import group_names, only_groups
 
 __all__ = ["ScalarImage"]
 
@@ -27,9 +28,9 @@ class ScalarImage:
 
     def __init__(self, mi: Any, work: Work) -> None:
         self._mi, self._work = mi, work
-        names = light_groups(work.scene)
+        names = group_names(work.scene)
         self.groups: tuple[str, ...] = names if work.keep_groups else ("all",)
-        self._scenes = [only_group(work.scene, name) for name in names] if work.keep_groups else [work.scene]
+        self._scenes = [only_groups(work.scene, frozenset({name})) for name in names] if work.keep_groups else [work.scene]
         self.rows, self.cols = work.camera.film.rows, work.camera.film.cols
         self.counts = np.zeros(self.rows * self.cols, dtype=np.int64)
         self._rounds = 0
@@ -44,6 +45,7 @@ class ScalarImage:
         self.bad_samples = 0
         self.segments = 0
         self.cpu_s = 0.0
+        self.clamped_fraction = 0.0
 
     @property
     def samples(self) -> int:
@@ -78,6 +80,11 @@ class ScalarImage:
         self.bad_samples += int(image.size - np.count_nonzero(good))
         return np.where(good, image, 0.0), int(sensor.sampler().sample_count())
 
+    def restart(self, clamp: NDArray[np.float64]) -> None:
+        """Refuse: the renderer's own film has no clamp."""
+        del clamp
+        raise RenderError("samples cannot be clamped without LLVM; leave quality.max_sample_saturation out or install it.")
+
     def replicas(self) -> NDArray[np.float32]:
         """Return the replicas' means, (replicas, groups, channels, rows, cols) [e- s^-1 m^-2 sr^-1]."""
         means = self._sums / np.maximum(self.counts, 1)
@@ -93,21 +100,6 @@ class ScalarImage:
     def check(self) -> None:
         """Raise RenderError where too many samples were no numbers, or where the light exceeds single precision."""
         check_samples(self.bad_samples, self.samples, (self._sums, self._band_sums), int(self.counts.max()))
-
-
-def only_group(scene: SceneDescription, name: str) -> SceneDescription:
-    """Return the scene with the lamps of one group."""
-    objects = tuple(
-        replace(
-            item,
-            parts=tuple(
-                part if part.emission is None or part.emission.group == name else replace(part, emission=None)
-                for part in item.parts
-            ),
-        )
-        for item in scene.objects
-    )
-    return replace(scene, objects=objects, lights=tuple(light for light in scene.lights if light.group == name))
 
 
 def _sensor(mi: Any, camera: Camera, grid: WavelengthGrid, samples: int) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from fullwell.core.errors import FieldError, ShapeError
 from fullwell.radiometry.grid import WavelengthGrid
 from fullwell.radiometry.spectrum import Spectrum
 
-__all__ = ["CaptureRecord", "OpticalImage", "RawImage"]
+__all__ = ["CaptureRecord", "ChannelImage", "OpticalImage", "RawImage"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,6 +67,23 @@ class OpticalImage:
     def width_m(self) -> float:
         """Width of the image on the sensor plane [m]."""
         return self.cols * self.sample_pitch_m
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ChannelImage:
+    """What the channels of a sensor would count on the sensor plane, on the samples of an `OpticalImage`.
+
+    Attributes
+    ----------
+    electrons
+        (channels, rows, cols) float64 [e- s^-1 m^-2], as if the sensor had the channel everywhere.
+    sample_pitch_m, notes
+        As in `OpticalImage`.
+    """
+
+    electrons: NDArray[np.float64]
+    sample_pitch_m: float
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

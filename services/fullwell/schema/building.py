@@ -2,28 +2,36 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import math
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fullwell.core.errors import FieldError
-from fullwell.core.hashing import canonical_json
+from fullwell.core.hashing import canonical_json, digest_of
 from fullwell.schema.errors import RecipeError
 from fullwell.schema.loading import document_of
 from fullwell.schema.paths import with_values
-from fullwell.schema.v1.recipe import RecipeDocument
+from fullwell.schema.v1.recipe import QualityDocument, RecipeDocument
 from fullwell.schema.variation import extreme_values, frame_values
 
 if TYPE_CHECKING:
-    from fullwell.schema.conversion.context import AssetReader, RecipeFiles
+    from fullwell.schema.conversion.context import AssetReader, Context, RecipeFiles
     from fullwell.schema.conversion.scenes import PlacedScene
-    from fullwell.schema.frame import CameraRig, FrameDescription
+    from fullwell.schema.frame import CameraRig, FrameDescription, Quality, View
 
 __all__ = ["RecipeBuilder", "build_frame", "frame_document", "validate"]
 
 _BUILT_VALUES = 200
 """Varied values that `validate` builds completely; the others are read and checked against the document's ranges."""
 _READ_VALUES = 5000
+_MOST_VIEWS = 64
+"""Views of one light that its sampling looks after; each costs a glance at the whole image per round."""
+
+DEFAULT_NOISE_RATIO = 0.5
+"""The variance of the picture's noise is then 25 % more than the sensor's alone, wherever the cap is not reached."""
 
 
 def build_frame(
@@ -73,6 +81,7 @@ class RecipeBuilder:
         self._base_dir = document.base_dir if base_dir is None else base_dir
         self._asset_reader = asset_reader
         self._files: RecipeFiles | None = None
+        self._views: tuple[tuple[View, ...], ...] | None = None
 
     def frame(self, index: int) -> FrameDescription:
         """Return frame `index`, resolved and checked. Raises RecipeError, or FieldError where there is no such frame."""
@@ -110,7 +119,7 @@ class RecipeBuilder:
         from fullwell.schema.conversion.cameras import camera_rig  # noqa: PLC0415
         from fullwell.schema.conversion.context import Context, RecipeFiles  # noqa: PLC0415
         from fullwell.schema.conversion.scenes import scene_of  # noqa: PLC0415
-        from fullwell.schema.frame import FrameDescription, Quality  # noqa: PLC0415
+        from fullwell.schema.frame import FrameDescription  # noqa: PLC0415
 
         if self._files is None:
             # The owner of a recipe file may name any file; a recipe from elsewhere only those of the folder it is given.
@@ -122,6 +131,9 @@ class RecipeBuilder:
             camera_rig(camera, f"cameras[{i}]", recipe.quality.oversampling, context) for i, camera in enumerate(recipe.cameras)
         )
         placed = scene_of(recipe.scene, context)
+        _check_light_groups(recipe, placed)
+        if self._views is None:
+            self._views = self._shared_views(context)
         _check_cameras_outside(cameras, placed)
         plain = recipe.plain() | {"files": dict(sorted(context.used_files.items()))}
         return FrameDescription(
@@ -134,10 +146,75 @@ class RecipeBuilder:
             cameras=cameras,
             grid=grid,
             outputs=tuple(recipe.outputs),
-            quality=Quality(recipe.quality.samples_per_pixel, recipe.quality.max_depth),
+            quality=_quality(recipe.quality),
             warnings=context.all_warnings(),
             recipe_json=canonical_json(plain).decode(),
+            group_weights=tuple(sorted(recipe.scene.light_groups.items())),
+            views=self._views,
         )
+
+    def _shared_views(self, context: Context) -> tuple[tuple[View, ...], ...]:
+        """Return each camera's views of the same light that frames of the recipe have; () where `vary` changes none.
+
+        All combinations where they are few; otherwise every value by itself.
+        """
+        from fullwell.schema.conversion.cameras import camera_rig  # noqa: PLC0415
+        from fullwell.schema.frame import View  # noqa: PLC0415
+
+        vary = self._document.vary
+        extremes: dict[str, list[Any]] = {}
+        for _, path, value in () if vary is None else extreme_values(vary):
+            if _changes_only_the_view(path):
+                extremes.setdefault(path, []).append(value)
+        if not extremes:
+            return ()
+        base = frame_values(self._document, 0)
+        if math.prod(len(values) for values in extremes.values()) <= _MOST_VIEWS:
+            changes = [dict(zip(extremes, chosen, strict=True)) for chosen in itertools.product(*extremes.values())]
+        else:
+            changes = [{path: value} for path, values in extremes.items() for value in values][:_MOST_VIEWS]
+        found: dict[str, tuple[View, ...]] = {}
+        for change in changes:
+            recipe = _varied_document(self._document, base | change)
+            weights = tuple(sorted(recipe.scene.light_groups.items()))
+            rigs = [camera_rig(c, f"cameras[{i}]", recipe.quality.oversampling, context) for i, c in enumerate(recipe.cameras)]
+            views = tuple(View(rig.sensors, weights) for rig in rigs)
+            found.setdefault(digest_of([[[s.model, s.exposure] for s in view.sensors] for view in views] + [weights]), views)
+        return tuple(zip(*found.values(), strict=True))
+
+
+def _changes_only_the_view(path: str) -> bool:
+    """Return whether a varied place changes how light is looked at, not the light."""
+    return path.startswith("scene.light_groups") or re.match(r"cameras\[\d+\]\.sensors\b", path) is not None
+
+
+def _quality(document: QualityDocument) -> Quality:
+    """Return the quality; where a recipe says nothing, the error of the light is half of the sensor's own noise."""
+    from fullwell.schema.frame import Quality  # noqa: PLC0415
+
+    ratio = document.noise_ratio
+    if ratio is None and document.samples_per_pixel is None:
+        ratio = DEFAULT_NOISE_RATIO
+    return Quality(
+        noise_ratio=ratio,
+        samples_per_pixel=document.samples_per_pixel,
+        max_samples_per_pixel=document.max_samples_per_pixel,
+        time_limit_s=document.time_limit_s,
+        max_sample_saturation=document.max_sample_saturation,
+        max_depth=document.max_depth,
+    )
+
+
+def _check_light_groups(recipe: RecipeDocument, placed: PlacedScene) -> None:
+    """Refuse weights for groups that no light is in."""
+    from fullwell.core.errors import unknown_name_message  # noqa: PLC0415
+    from fullwell.scene.groups import group_names  # noqa: PLC0415
+    from fullwell.schema.conversion.context import fail  # noqa: PLC0415
+
+    known = group_names(placed.description)
+    for name in recipe.scene.light_groups:
+        if name not in known:
+            fail(f"scene.light_groups.{name}", unknown_name_message("light group", name, known), name)
 
 
 def _told(error: RecipeError, circumstance: str) -> RecipeError:

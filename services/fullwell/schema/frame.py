@@ -11,7 +11,7 @@ from fullwell.radiometry import WavelengthGrid
 from fullwell.scene import Camera, SceneDescription
 from fullwell.sensor.parameters import Exposure, SensorModel
 
-__all__ = ["PRODUCTS", "CameraRig", "FrameDescription", "Quality", "SensorRig"]
+__all__ = ["PRODUCTS", "CameraRig", "FrameDescription", "Quality", "SensorRig", "View"]
 
 PRODUCTS: tuple[str, ...] = (
     "image.png",
@@ -31,9 +31,27 @@ PRODUCTS: tuple[str, ...] = (
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """How much work the renderer does: `samples_per_pixel` (camera rays) and `max_depth` (surface hits of a path)."""
+    """How much work the renderer does.
 
-    samples_per_pixel: int = 64
+    Attributes
+    ----------
+    noise_ratio
+        Standard error of the light over the sensor's noise that is to be reached; None for equal samples.
+    samples_per_pixel
+        Camera rays per film sample where they are equal; None where they follow the noise.
+    max_samples_per_pixel, time_limit_s
+        Caps where samples follow the noise.
+    max_sample_saturation
+        Clamp of single samples, in lights that fill the well; None for none.
+    max_depth
+        Segments of the longest path.
+    """
+
+    noise_ratio: float | None = 0.5
+    samples_per_pixel: int | None = None
+    max_samples_per_pixel: int = 4096
+    time_limit_s: float | None = None
+    max_sample_saturation: float | None = None
     max_depth: int = 8
 
 
@@ -61,6 +79,14 @@ class CameraRig:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """One way in which frames of a recipe look at the same light: a camera's sensors, and weights of light groups."""
+
+    sensors: tuple[SensorRig, ...]
+    group_weights: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class FrameDescription:
     """Everything that decides the bytes of one frame.
 
@@ -76,6 +102,11 @@ class FrameDescription:
         Sentences for the manifest: upsampled colours and the like.
     recipe_json
         The recipe of this frame as canonical JSON text, with `vary` and overrides applied and removed.
+    group_weights
+        (name, factor) of light groups in the picture; those left out have 1.
+    views
+        For each camera, the views that frames of the recipe have of the same light, this frame's among them: what is rendered
+        must serve them all, so that it need not be rendered again for the next. Empty where only this frame's counts.
     """
 
     recipe_name: str
@@ -90,3 +121,5 @@ class FrameDescription:
     quality: Quality
     warnings: tuple[str, ...]
     recipe_json: str
+    group_weights: tuple[tuple[str, float], ...] = ()
+    views: tuple[tuple[View, ...], ...] = ()

@@ -18,10 +18,11 @@ from fullwell.render.conditioning import (
 )
 from fullwell.render.transport.surfaces import CurvedShape, PartRecord, SceneSurfaces
 from fullwell.scene import Cylinder, Dielectric, Disk, Material, Mesh, Part, SceneDescription, Sphere
+from fullwell.scene.groups import group_names
 from fullwell.scene.tessellate import is_similarity, mesh_of, transform_mesh
 from fullwell.scene.validate import check_scene, may_repeat_faces
 
-__all__ = ["BLACK", "RAY_OFFSET", "collect_surfaces", "light_groups"]
+__all__ = ["BLACK", "RAY_OFFSET", "collect_surfaces"]
 
 BLACK = 1e-35
 """Spectra below this are black: single precision has nothing smaller to work with."""
@@ -44,18 +45,12 @@ def collect_surfaces(scene: SceneDescription, centre_m: NDArray[np.float64]) -> 
     check_reach(scene, centre_m, smallest_m=_SMALLEST_REACH_M)
     recentre = np.eye(4)
     recentre[:3, 3] = -np.asarray(centre_m, dtype=np.float64)
-    collector = _Collector(light_groups(scene))
+    collector = _Collector(group_names(scene))
     for index, scene_object in enumerate(scene.objects):
         for number, part in enumerate(scene_object.parts):
             with naming(scene_object.id, index, number):
                 collector.add(index, part, recentre @ scene_object.to_world @ part.to_object)
     return collector.finish()
-
-
-def light_groups(scene: SceneDescription) -> tuple[str, ...]:
-    """Return the names of a scene's light groups, in alphabetical order; "default" where it has no lights."""
-    of_surfaces = {part.emission.group for item in scene.objects for part in item.parts if part.emission is not None}
-    return tuple(sorted(of_surfaces | {light.group for light in scene.lights})) or ("default",)
 
 
 @dataclass(slots=True)

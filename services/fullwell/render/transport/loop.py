@@ -49,12 +49,13 @@ class _Inputs:
 @dataclass(frozen=True, slots=True, eq=False)
 class PathSums:
     """Sums over each lane's samples: `channels[group][channel]` arrays, `bands` flat (lane, group, band) or None, `bad`
-    samples and `segments` traced."""
+    samples, `segments` traced, and the light that was `clamped` away, of all channels."""
 
     channels: list[list[Any]]
     bands: Any | None
     bad: Any
     segments: Any
+    clamped: Any
 
 
 class PathLoop:
@@ -101,8 +102,8 @@ class PathLoop:
         film = None
         if self._bands:
             film = dr.zeros(mi.Float, lanes * self._groups * tables["band_count_host"])
-        channels, bad, segments = _decorated(dr)(self, _Inputs(scene, camera, tables, launch, film), lanes)
-        return PathSums(channels, film, bad, segments)
+        channels, bad, segments, clamped = _decorated(dr)(self, _Inputs(scene, camera, tables, launch, film), lanes)
+        return PathSums(channels, film, bad, segments, clamped)
 
     def _added(self, radiance: list[Any], value: Any, group: Any) -> list[Any]:
         """Return the groups' radiances with `value` added to that of its group."""
@@ -118,20 +119,25 @@ class PathLoop:
         jitter = numbers.pair(0)
         x_px, y_px = mi.Float(launch.pixel - row * tables["columns"]) + jitter.x, mi.Float(row) + jitter.y
         origin, direction = camera.through_lens(x_px, y_px, numbers.pair(1))
-        u = numbers.pair(2).x
+        cells = []
         if self._bands:
-            cells = []
-            for band in self._bands_of(tables, launch, sample):
-                nm = tables["band_first_nm"] + tables["band_step_nm"] * (mi.Float(band) + u)
+            # Once through all bands, W wavelengths have been in each: they are spread evenly over it, and so are the rounds.
+            u = PathSampler(mi, launch.seed, sample // tables["band_count"]).pair(2).x
+            for k, band in enumerate(self._bands_of(tables, launch, sample)):
+                nm = tables["band_first_nm"] + tables["band_step_nm"] * (mi.Float(band) + self._shifted(u, k))
                 cells.append(mi.UInt32(dr.clip((nm - FIRST_EDGE_NM) * (1.0 / CELL_NM), 0.0, CELL_COUNT - 1.0)))
         else:
-            cells = []
+            u = numbers.pair(2).x
             for k in range(self._wavelengths):
-                shifted = u + k / self._wavelengths
-                shifted = dr.select(shifted >= 1.0, shifted - 1.0, shifted)
+                shifted = self._shifted(u, k)
                 slot = dr.minimum(mi.UInt32(shifted * SLOTS), SLOTS - 1)
                 cells.append(dr.gather(mi.UInt32, tables["slots"], slot))
         return origin, direction, dr.llvm.ad.ArrayXu(cells)
+
+    def _shifted(self, u: Any, k: int) -> Any:
+        """Return the number of a path's wavelength k, in [0, 1): all of them are equally far apart on a circle."""
+        shifted = u + k / self._wavelengths
+        return self._dr.select(shifted >= 1.0, shifted - 1.0, shifted)
 
     def _bands_of(self, tables: Tables, launch: Launch, sample: Any) -> list[Any]:
         """Return the bands of a path's wavelengths.
@@ -193,6 +199,7 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
     sums = [[dr.zeros(mi.Float, lanes) for _ in range(self._channels)] for _ in range(self._groups)]
     bad = dr.zeros(mi.UInt32, lanes)
     segments = dr.zeros(mi.UInt32, lanes)
+    clamped = dr.zeros(mi.Float, lanes)
 
     while active:
         if fresh:
@@ -279,9 +286,16 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
             for group in range(self._groups):
                 total = dr.sum(radiance[group])
                 good &= dr.isfinite(total) & (dr.min(radiance[group]) >= 0)
+            counted = [self._to_channels(given.tables, radiance[group], cells) for group in range(self._groups)]
+            excess = mi.Float(1.0)
+            for channel in range(self._channels):
+                together = sum(of_group[channel] for of_group in counted)
+                excess = dr.maximum(excess, together * given.tables["inverse_clamp"][channel])
+            kept = dr.select(good, dr.rcp(excess), 0.0)
             for group in range(self._groups):
-                for channel, value in enumerate(self._to_channels(given.tables, radiance[group], cells)):
-                    sums[group][channel] += dr.select(good, value, 0.0)
+                for channel in range(self._channels):
+                    sums[group][channel] += counted[group][channel] * kept
+                    clamped += dr.select(good, counted[group][channel] * (1.0 - kept), 0.0)
             if given.film is not None:
                 lane = dr.arange(mi.UInt32, lanes)
                 for k, band in enumerate(self._bands_of(given.tables, given.launch, sample)):
@@ -289,10 +303,14 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
                     for group in range(self._groups):
                         index = (lane * self._groups + group) * given.tables["band_count"] + band
                         dr.scatter_add(
-                            given.film, radiance[group][k] * photons, index, finished & good, mode=dr.ReduceMode.NoConflicts
+                            given.film,
+                            radiance[group][k] * (photons * kept),
+                            index,
+                            finished & good,
+                            mode=dr.ReduceMode.NoConflicts,
                         )
             bad += dr.select(good, 0, 1)
             sample += 1
         fresh = finished
         active &= sample < end
-    return sums, bad, segments
+    return sums, bad, segments, clamped

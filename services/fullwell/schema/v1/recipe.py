@@ -10,7 +10,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 from fullwell.core.errors import unknown_name_message
 from fullwell.core.hashing import canonical_json
 from fullwell.schema.v1.cameras import CameraDocument
-from fullwell.schema.v1.common import Class, Document, Flag, Id, Range, Text, TextPattern, refuse
+from fullwell.schema.v1.common import Class, Document, Flag, Group, Id, NonNegative, Range, Text, TextPattern, refuse
 from fullwell.schema.v1.geometry import GeometryDocument, Transform
 from fullwell.schema.v1.lights import LightDocument
 from fullwell.schema.v1.materials import MaterialDocument, MaterialReference
@@ -122,11 +122,15 @@ class ObjectDocument(Document):
 
 
 class SceneDocument(Document):
-    """Materials by name, objects, lights, and the order of the semantic classes."""
+    """Materials by name, objects, lights, and the order of the semantic classes.
+
+    `light_groups` weights the light of named groups in the picture: other weights of the same scene render nothing anew.
+    """
 
     materials: dict[str, MaterialDocument] = Field(default_factory=dict)
     objects: list[ObjectDocument] = Field(default_factory=list, max_length=200_000)
     lights: list[LightDocument] = Field(default_factory=list, max_length=10_000)
+    light_groups: dict[Group, NonNegative] = Field(default_factory=dict)
     classes: list[Class] | None = None
 
     @model_validator(mode="after")
@@ -160,11 +164,33 @@ class SceneDocument(Document):
 
 
 class QualityDocument(Document):
-    """How much work the renderer does. `oversampling` is the number of film samples along the side of the finest pixel."""
+    """How much work the renderer does.
 
-    samples_per_pixel: Annotated[int, Range(ge=1, le=65536, whole=True)] = 64
+    By default it samples every part of the picture until its own error is `noise_ratio` of the noise that the sensor adds
+    there, with at most `max_samples_per_pixel` and, where given, within `time_limit_s` (results then depend on the machine).
+    `samples_per_pixel` asks for equal samples everywhere instead. `max_sample_saturation` clamps single samples to that many
+    times the light that fills the sensor's well: less noise from rare bright paths, at the price of a little light, whose
+    amount is measured. `oversampling` is the number of film samples along the side of the finest pixel.
+    """
+
+    noise_ratio: Annotated[float, Range(ge=0.01, le=100)] | None = None
+    samples_per_pixel: Annotated[int, Range(ge=1, le=65536, whole=True)] | None = None
+    max_samples_per_pixel: Annotated[int, Range(ge=4, le=1_048_576, whole=True)] = 4096
+    time_limit_s: Annotated[float, Range(gt=0)] | None = None
+    max_sample_saturation: Annotated[float, Range(ge=1)] | None = None
     max_depth: Annotated[int, Range(ge=1, le=1000, whole=True)] = 8
     oversampling: Annotated[int, Range(ge=1, le=16, whole=True)] = 1
+
+    @model_validator(mode="after")
+    def _one_way(self) -> QualityDocument:
+        if self.samples_per_pixel is not None and self.noise_ratio is not None:
+            refuse(
+                f"is {self.samples_per_pixel}, and noise_ratio is {self.noise_ratio:g}: samples are either equal everywhere or "
+                "follow the noise. Give one of them; max_samples_per_pixel caps the latter.",
+                "samples_per_pixel",
+                value=self.samples_per_pixel,
+            )
+        return self
 
 
 class RecipeDocument(Document):

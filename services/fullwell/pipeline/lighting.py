@@ -1,0 +1,342 @@
+"""What of the light a camera's frame needs: channels or spectra, which groups, how exact, how deep; and why."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fullwell.core.hashing import digest_of
+from fullwell.isp import scene_illuminant
+from fullwell.optics import IDEAL_LENS, channels_suffice, form_channel_image, nyquist_contrast_loss, working_f_number
+from fullwell.pipeline.noise import SensorNoise
+from fullwell.pipeline.steps import PlanStep
+from fullwell.radiometry import ChannelRadiance, Spectrum, WavelengthGrid
+from fullwell.render import REPLICAS, LightRequest, NoiseTarget, SamplingGoal
+from fullwell.scene import Dielectric, Film, SceneDescription
+from fullwell.scene.groups import group_names, only_groups
+from fullwell.schema.frame import CameraRig, FrameDescription, SensorRig, View
+from fullwell.sensor import exposure_time
+from fullwell.sensor.quantum_efficiency import ChannelCurrents
+
+__all__ = ["LightPlan", "plan_light"]
+
+_MOST_RESPONSES = 12
+"""Channels, or parts of them, that are counted directly; with more, the spectrum is cheaper than a column for each."""
+
+_MOST_PARTS = 3
+
+_CONTRAST_BOUND = 0.02
+"""Change of contrast at the Nyquist frequency that one wavelength a channel may cause, for any colour of an object."""
+
+_SPECTRAL_PRODUCTS = frozenset({"radiance.exr", "irradiance.exr"})
+_SLOPES_PER_NM = (-0.01, 0.01)
+"""Relative slopes of reflectance: a factor of e within 100 nm is a strong colour. Lamps with lines are in the light itself."""
+
+Places = tuple[tuple[int, ...], ...]
+"""For each channel of a sensor, the responses whose sum it counts."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LightPlan:
+    """What is rendered for a camera.
+
+    Attributes
+    ----------
+    scene
+        The scene without what cannot matter.
+    request
+        To be completed with a seed.
+    channels
+        By the sensor's name, for each of its channels the responses of the request that it is the sum of; empty where the
+        spectrum serves.
+    wavelength_nm
+        (responses,) mean wavelengths [nm].
+    steps
+        The decisions, for people.
+    identity
+        Digest of all that decides the light beside scene, pose, film and seed.
+    """
+
+    scene: SceneDescription
+    request: LightRequest
+    channels: dict[str, Places]
+    wavelength_nm: NDArray[np.float64]
+    steps: tuple[PlanStep, ...]
+    identity: str
+
+    def light_of(self, sensor: SensorRig, light: NDArray[np.float64], tangent_pitch: float) -> ChannelRadiance:
+        """Return what a sensor's channels count, part by part, from (responses, rows, cols) of light."""
+        places = self.channels[sensor.name]
+        parts = [part for of_channel in places for part in of_channel]
+        channel = np.repeat(np.arange(len(places)), [len(of_channel) for of_channel in places])
+        return ChannelRadiance(light[parts], self.wavelength_nm[parts], channel, tangent_pitch)
+
+    def shapes(self, film: Film) -> tuple[tuple[int, ...], tuple[int, ...] | None]:
+        """Return the shapes of the replicas and of the bands, None where they are not kept."""
+        request = self.request
+        groups = len(group_names(self.scene)) if request.keep_groups else 1
+        replicas = (REPLICAS, groups, len(request.responses), film.rows, film.cols)
+        return replicas, (groups, film.rows, film.cols, request.grid.count) if request.keep_bands else None
+
+
+def plan_light(frame: FrameDescription, rig: CameraRig, position: int, *, skip: bool = True) -> LightPlan:
+    """Return what is to be rendered for the camera at `position`; with `skip` false nothing is left out."""
+    views = frame.views[position] if frame.views else (View(rig.sensors, frame.group_weights),)
+    steps: list[PlanStep] = []
+    sensors = (*(sensor for view in views for sensor in view.sensors), *rig.sensors)
+    light = scene_illuminant(frame.scene, rig.camera) or Spectrum.constant(1.0)
+    responses, places, bands, direct = _choose_form(frame, rig, sensors, light, skip=skip, steps=steps)
+    means = _mean_wavelengths(frame.grid, responses, light)
+    scene, keep_groups = _choose_groups(frame, rig, views, skip=skip, steps=steps)
+    quality = frame.quality
+    goal = SamplingGoal(
+        noise_ratio=quality.noise_ratio,
+        samples_per_pixel=quality.samples_per_pixel or 1,
+        max_samples_per_pixel=quality.max_samples_per_pixel,
+        time_limit_s=quality.time_limit_s,
+        clamp_saturation=quality.max_sample_saturation,
+    )
+    targets = _targets(frame.grid, rig, views, places)
+    steps.append(_sampling_step(frame, rig, views))
+    steps.append(_depth_step(frame, rig))
+    request = LightRequest(
+        grid=frame.grid,
+        responses=responses,
+        keep_bands=bands,
+        keep_groups=keep_groups,
+        max_depth=quality.max_depth,
+        goal=goal,
+        targets=targets,
+        group_importance=_importance(views) if keep_groups else (),
+    )
+    channels = {s.name: places[_channel_digest(s)] for s in rig.sensors} if direct else {}
+    adaptive = goal.noise_ratio is not None or quality.max_sample_saturation is not None
+    identity = digest_of(
+        {
+            "responses": list(responses),
+            "bands": bands,
+            "groups": keep_groups,
+            "importance": list(request.group_importance),
+            "goal": goal,
+            "depth": quality.max_depth,
+            "lens": [rig.camera.lens.f_number, rig.camera.lens.magnification] if adaptive else None,
+            "views": [[[[s.model, s.exposure] for s in v.sensors], list(v.group_weights)] for v in views] if adaptive else None,
+        }
+    )
+    return LightPlan(scene, request, channels, means, tuple(steps), identity)
+
+
+# Channels or bands ---------------------------------------------------------------------------------------------------
+
+
+def _responses(rig: CameraRig, sensors: tuple[SensorRig, ...], parts: int) -> tuple[tuple[Spectrum, ...], dict[str, Places]]:
+    """Return the distinct responses behind the lens, each channel in `parts`, and by sensor's digest those of its channels."""
+    known: dict[str, tuple[int, ...]] = {}
+    found: list[Spectrum] = []
+    places: dict[str, Places] = {}
+    for sensor in sensors:
+        key = _channel_digest(sensor)
+        if key in places:
+            continue
+        of_sensor = []
+        for _, efficiency in sensor.model.cfa.channels:
+            digest = digest_of([efficiency.wavelength_nm, efficiency.values, efficiency.outside])
+            if digest not in known:
+                pieces = _parts(grid, efficiency.times(rig.camera.lens.transmittance), parts)
+                known[digest] = tuple(range(len(found), len(found) + len(pieces)))
+                found.extend(pieces)
+            of_sensor.append(known[digest])
+        places[key] = tuple(of_sensor)
+    return tuple(found), places
+
+
+def _parts(grid: WavelengthGrid, response: Spectrum, count: int) -> list[Spectrum]:
+    """Return a response cut at wavelengths between which it counts equally much; the parts add up to the whole."""
+    if count == 1 or not np.any(response.values > 0):
+        return [response]
+    fine_nm = _fine_nm(grid)
+    running = np.cumsum(response.at(fine_nm))
+    cuts = np.interp(np.arange(1, count) / count * running[-1], running, fine_nm)
+    edges = [300.0, *(float(round(cut, 1)) for cut in cuts), 1100.0]
+    pieces = []
+    for low, high in itertools.pairwise(edges):
+        inside = response.wavelength_nm[(response.wavelength_nm > low) & (response.wavelength_nm < high)]
+        knots = np.concatenate([[low], inside, [high]])
+        pieces.append(Spectrum(knots, response.at(knots), outside="zero", source=response.source))
+    return pieces
+
+
+def _channel_digest(sensor: SensorRig) -> str:
+    return digest_of([[e.wavelength_nm, e.values, e.outside] for _, e in sensor.model.cfa.channels])
+
+
+def _mean_wavelengths(
+    grid: WavelengthGrid, responses: tuple[Spectrum, ...], light: Spectrum, slope_per_nm: float = 0.0
+) -> NDArray[np.float64]:
+    """Return (responses,) mean wavelengths of the photons counted from a surface whose reflectance has a relative slope."""
+    wavelengths = _fine_nm(grid)
+    reflectance = np.exp(slope_per_nm * (wavelengths - wavelengths.mean()))
+    energy = light.at(wavelengths) * wavelengths * reflectance
+    weights = np.stack([response.at(wavelengths) * energy for response in responses])
+    plain = np.stack([response.at(wavelengths) for response in responses])
+    weights = np.where(weights.sum(axis=1, keepdims=True) > 0, weights, plain)
+    total = weights.sum(axis=1)
+    means = np.divide(weights @ wavelengths, total, out=np.full(len(responses), 550.0), where=total > 0)
+    return np.asarray(means, dtype=np.float64)
+
+
+def _choose_form(
+    frame: FrameDescription,
+    rig: CameraRig,
+    sensors: tuple[SensorRig, ...],
+    light: Spectrum,
+    *,
+    skip: bool,
+    steps: list[PlanStep],
+) -> tuple[tuple[Spectrum, ...], dict[str, Places], bool, bool]:
+    """Return (responses, places of the sensors' channels, whether bands are kept, whether channels serve), and say why."""
+    what = f"{rig.camera.name}: spectra"
+    edges = frame.grid.edges_nm
+    bands = f"{frame.grid.count} bands, {edges[0]:g}-{edges[-1]:g} nm"
+    asked = sorted(_SPECTRAL_PRODUCTS & set(frame.outputs))
+    reason, bound = "", 0.0
+    responses, places = _responses(frame.grid, rig, sensors, 1)
+    if rig.model == "isetcam":
+        reason = "ISETCam's camera works on bands"
+    elif not channels_suffice(rig.optics) or rig.depth_layers:
+        reason = "the lens's point image depends on the wavelength"
+    else:
+        for parts in range(1, _MOST_PARTS + 1):
+            responses, places = _responses(frame.grid, rig, sensors, parts)
+            bound = _contrast_bound(frame.grid, rig, responses, light)
+            if bound <= _CONTRAST_BOUND:
+                break
+        if bound > _CONTRAST_BOUND:
+            reason = f"diffraction differs within a channel: contrast by up to {bound:.2g} at Nyquist"
+        elif len(responses) > _MOST_RESPONSES:
+            reason = f"the sensors have {len(responses)} different responses; up to {_MOST_RESPONSES} are counted directly"
+    direct = not reason and skip
+    if not direct:
+        responses, places = _responses(frame.grid, rig, sensors, 1)
+        responses = responses[:_MOST_RESPONSES]
+    if direct and not asked:
+        low, high = _support(frame, responses)
+        why = f"{len(responses)} responses are counted directly; only {low:g}-{high:g} nm reach one"
+        steps.append(PlanStep(what, "skip", why, f"contrast at Nyquist within {bound:.2g} for strong colours"))
+        return responses, places, False, True
+    why = reason or (f"for {', '.join(asked)}" if asked else "asked for: nothing is skipped")
+    also = "; the sensors' channels are counted directly" if direct else ""
+    accuracy = f"contrast within {bound:.2g}" if direct else "the width of a band"
+    steps.append(PlanStep(what, "run", f"{bands}: {why}{also}", accuracy))
+    return responses, places, True, direct
+
+
+def _fine_nm(grid: WavelengthGrid) -> NDArray[np.float64]:
+    edges = grid.edges_nm
+    return np.asarray(np.arange(edges[0], edges[-1] + 0.25, 0.5), dtype=np.float64)
+
+
+def _support(frame: FrameDescription, responses: tuple[Spectrum, ...]) -> tuple[float, float]:
+    """Return the range of wavelengths in which some channel counts anything [nm]."""
+    edges = frame.grid.edges_nm
+    wavelengths = _fine_nm(frame.grid)
+    counted = np.max([response.at(wavelengths) for response in responses], axis=0) > 0
+    inside = wavelengths[counted]
+    return (float(inside[0]), float(inside[-1])) if inside.size else (float(edges[0]), float(edges[-1]))
+
+
+def _contrast_bound(grid: WavelengthGrid, rig: CameraRig, responses: tuple[Spectrum, ...], light: Spectrum) -> float:
+    """Return by how much the contrast at Nyquist may be off because a channel is diffracted at one wavelength."""
+    lens = rig.camera.lens
+    if not lens.diffraction:
+        return 0.0
+    f_number = working_f_number(lens.f_number, lens.magnification)
+
+    def losses(wavelengths: NDArray[np.float64]) -> NDArray[np.float64]:
+        pitch_m = rig.camera.film.pitch_m
+        each = (nyquist_contrast_loss(wavelength_nm=float(nm), f_number=f_number, pitch_m=pitch_m) for nm in wavelengths)
+        return np.array(list(each))
+
+    plain = losses(_mean_wavelengths(grid, responses, light))
+    return max(float(np.max(np.abs(losses(_mean_wavelengths(grid, responses, light, s)) - plain))) for s in _SLOPES_PER_NM)
+
+
+# Groups --------------------------------------------------------------------------------------------------------------
+
+
+def _choose_groups(
+    frame: FrameDescription, rig: CameraRig, views: tuple[View, ...], *, skip: bool, steps: list[PlanStep]
+) -> tuple[SceneDescription, bool]:
+    """Return the scene without lamps that no view shows, and whether groups are kept apart."""
+    what = f"{rig.camera.name}: light groups"
+    groups = group_names(frame.scene)
+    weights = [dict(view.group_weights) for view in views]
+    if all(weight == 1.0 for view in weights for weight in view.values()):
+        steps.append(PlanStep(what, "skip", f"{len(groups)} in one image: no view weights them"))
+        return frame.scene, False
+    dark = {name for name in groups if skip and all(view.get(name, 1.0) == 0.0 for view in weights)}
+    scene = only_groups(frame.scene, frozenset(groups) - dark) if dark else frame.scene
+    if dark:
+        steps.append(PlanStep(what, "skip", f"{', '.join(sorted(dark))}: weight 0 in every view"))
+    kept = [name for name in groups if name not in dark]
+    steps.append(PlanStep(what, "run", f"{', '.join(kept)} kept apart: other weights cost no rendering"))
+    return scene, True
+
+
+def _importance(views: tuple[View, ...]) -> tuple[tuple[str, float], ...]:
+    """Return by how much the lamps of a group are sampled more: as the strongest view weights them."""
+    names = {name for view in views for name, _ in view.group_weights}
+    strongest = {name: max(dict(view.group_weights).get(name, 1.0) for view in views) for name in names}
+    return tuple(sorted((name, weight) for name, weight in strongest.items() if weight > 0))
+
+
+# Samples -------------------------------------------------------------------------------------------------------------
+
+
+def _targets(
+    grid: WavelengthGrid, rig: CameraRig, views: tuple[View, ...], places: dict[str, Places]
+) -> tuple[tuple[tuple[tuple[str, float], ...], NoiseTarget], ...]:
+    """Return (group weights, noise of the sensors) of each view."""
+
+    def time_of(sensor: SensorRig, light: NDArray[np.float64]) -> float:
+        anywhere_nm = np.full(len(light), 550.0)
+        radiance = ChannelRadiance(light, anywhere_nm, np.arange(len(light)), rig.camera.tangent_pitch)
+        image = form_channel_image(radiance, replace(rig.camera.lens, diffraction=False), IDEAL_LENS)
+        currents = ChannelCurrents(image.electrons, sensor.model.cfa, grid, image.sample_pitch_m)
+        return exposure_time(currents, sensor.model, sensor.exposure)
+
+    targets = []
+    for view in views:
+        sensors = []
+        for sensor in view.sensors:
+            of_sensor = places[_channel_digest(sensor)]
+            if max(map(max, of_sensor)) < _MOST_RESPONSES:
+                sensors.append((sensor, of_sensor))
+        if sensors:
+            targets.append((view.group_weights, SensorNoise(rig, tuple(sensors), time_of)))
+    return tuple(targets)
+
+
+def _sampling_step(frame: FrameDescription, rig: CameraRig, views: tuple[View, ...]) -> PlanStep:
+    quality, film = frame.quality, rig.camera.film
+    size = f"{film.cols} x {film.rows} samples"
+    what = f"{rig.camera.name}: render"
+    if quality.noise_ratio is None:
+        return PlanStep(what, "run", f"{size}, {quality.samples_per_pixel} rays each", "Monte-Carlo error, in the manifest")
+    shared = f" in each of {len(views)} views" if len(views) > 1 else ""
+    cap = f"at most {quality.max_samples_per_pixel} rays each"
+    if quality.time_limit_s is not None:
+        cap += f" and {quality.time_limit_s:g} s"
+    return PlanStep(
+        what, "run", f"{size}, {cap}, until the noise allows{shared}", f"{quality.noise_ratio:g} of the sensor's noise"
+    )
+
+
+def _depth_step(frame: FrameDescription, rig: CameraRig) -> PlanStep:
+    depth = frame.quality.max_depth
+    glass = any(isinstance(part.material, Dielectric) for item in frame.scene.objects for part in item.parts)
+    why = "glass in the scene" if glass else "no glass in the scene"
+    return PlanStep(f"{rig.camera.name}: paths", "run", f"up to {depth} segments ({why})", "paths that are longer")
