@@ -431,7 +431,7 @@ class Surface:
     def evaluate(self, wi: Any, wo: Any) -> tuple[Any, Any]:
         """Return the scattering function x |cosine|, per wavelength, and the density [sr^-1]: of all but delta lobes."""
         wi_up, wo_up = self._upright(wi, wi), self._upright(wo, wi)
-        value, pdf = self._opaque(wi_up, wo_up)
+        value, pdf, _ = self._opaque(wi_up, wo_up)
         if self._glass:
             value, pdf = self._dr.select(self.is_glass, 0.0, value), self._dr.select(self.is_glass, 0.0, pdf)
         if self._rough_glass:
@@ -455,11 +455,11 @@ class Surface:
             delta = at_facet & self.polished
             facet = dr.select(self.polished, mi.Vector3f(0, 0, 1), normal)
             wo = dr.select(at_facet, 2.0 * dr.dot(up, facet) * facet - up, wo)
-        weight, pdf = self._opaque(up, wo)
+        weight, pdf, reflectance = self._opaque(up, wo)
         weight = dr.select(pdf > 0, weight / dr.maximum(pdf, 1e-30), 0.0)
         if self._lobes:
-            mirrored = self._facet_reflectance(up.z, up.z) / dr.maximum(share, 1e-30)
-            weight, pdf = dr.select(delta, mirrored, weight), dr.select(delta, 0.0, pdf)
+            weight = dr.select(delta, reflectance / dr.maximum(share, 1e-30), weight)
+            pdf = dr.select(delta, 0.0, pdf)
         drawn = BsdfSample(
             wo, weight, pdf, mi.Bool(False) if delta is None else delta, mi.Bool(False), mi.Bool(False), mi.Float(1.0)
         )
@@ -474,20 +474,22 @@ class Surface:
 
     # Opaque surfaces -------------------------------------------------------------------------------------------------
 
-    def _opaque(self, wi: Any, wo: Any) -> tuple[Any, Any]:
+    def _opaque(self, wi: Any, wo: Any) -> tuple[Any, Any, Any]:
+        """Return the scattering function x cosine, the density, and the reflectance of the facets between the directions."""
         dr = self._dr
         above = (wi.z > 0) & (wo.z > 0)
         cosine = dr.maximum(wo.z, 0.0) / np.pi
-        value, pdf = self._base(wi.z, wo.z) * cosine, cosine
+        value, pdf, reflectance = self._base(wi.z, wo.z) * cosine, cosine, None
         if self._lobes:
-            half = dr.normalize(wi + wo)
+            total = wi + wo
+            half = dr.normalize(self._mi.Vector3f(total.x, total.y, dr.maximum(total.z, 1e-12)))
             facets = 0.25 * density(dr, half, self._alpha) * masking_per_cosine(dr, wi, self._alpha)
             facets = dr.select(self.polished, 0.0, facets)
             share = self._facet_share(wi.z)
             reflectance = self._facet_reflectance(dr.minimum(dr.dot(wi, half), 1.0), wi.z)
             value = value + reflectance * (facets * masking(dr, wo, self._alpha))
             pdf = dr.lerp(pdf, facets, share)
-        return dr.select(above, value, 0.0), dr.select(above, pdf, 0.0)
+        return dr.select(above, value, 0.0), dr.select(above, pdf, 0.0), reflectance
 
     def _base(self, mu_i: Any, mu_o: Any) -> Any:
         """Return pi times the scattering function of all that scatters widely."""
