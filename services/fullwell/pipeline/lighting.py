@@ -26,7 +26,8 @@ __all__ = ["LightPlan", "plan_light"]
 _MOST_RESPONSES = 12
 """Channels, or parts of them, that are counted directly; with more, the spectrum is cheaper than a column for each."""
 
-_MOST_PARTS = 3
+_MOST_PARTS = 4
+"""Ranges of wavelength that a channel is cut into, so that diffraction is nearly the same within each."""
 
 _CONTRAST_BOUND = 0.02
 """Change of contrast at the Nyquist frequency that one wavelength a channel may cause, for any colour of an object."""
@@ -132,7 +133,9 @@ def plan_light(frame: FrameDescription, rig: CameraRig, position: int, *, skip: 
 # Channels or bands ---------------------------------------------------------------------------------------------------
 
 
-def _responses(rig: CameraRig, sensors: tuple[SensorRig, ...], parts: int) -> tuple[tuple[Spectrum, ...], dict[str, Places]]:
+def _responses(
+    grid: WavelengthGrid, rig: CameraRig, sensors: tuple[SensorRig, ...], parts: int
+) -> tuple[tuple[Spectrum, ...], dict[str, Places]]:
     """Return the distinct responses behind the lens, each channel in `parts`, and by sensor's digest those of its channels."""
     known: dict[str, tuple[int, ...]] = {}
     found: list[Spectrum] = []
@@ -154,15 +157,11 @@ def _responses(rig: CameraRig, sensors: tuple[SensorRig, ...], parts: int) -> tu
 
 
 def _parts(grid: WavelengthGrid, response: Spectrum, count: int) -> list[Spectrum]:
-    """Return a response cut at wavelengths between which it counts equally much; the parts add up to the whole."""
-    if count == 1 or not np.any(response.values > 0):
+    """Return a response cut into equally wide ranges of wavelength; the parts add up to the whole within the bands."""
+    if count == 1:
         return [response]
-    fine_nm = _fine_nm(grid)
-    running = np.cumsum(response.at(fine_nm))
-    cuts = np.interp(np.arange(1, count) / count * running[-1], running, fine_nm)
-    edges = [300.0, *(float(round(cut, 1)) for cut in cuts), 1100.0]
     pieces = []
-    for low, high in itertools.pairwise(edges):
+    for low, high in itertools.pairwise(np.linspace(grid.edges_nm[0], grid.edges_nm[-1], count + 1)):
         inside = response.wavelength_nm[(response.wavelength_nm > low) & (response.wavelength_nm < high)]
         knots = np.concatenate([[low], inside, [high]])
         pieces.append(Spectrum(knots, response.at(knots), outside="zero", source=response.source))
