@@ -48,6 +48,9 @@ _EVEN_SHARE_DISTANT = 0.1
 _FLAT_WEIGHT = 1e-3
 """Added to the spectral weights, of their mean, so that a light outside all channels is still found."""
 
+_LEAST_GROUP_WEIGHT = 1e-3
+"""Of the largest: a group that nobody asked for is still found, so that its light has no bias."""
+
 _NORMAL_SET = 0.5
 """Squared length above which a receiver's normal is one, and not the zero vector that stands for none."""
 
@@ -404,7 +407,8 @@ class _Collected:
     ) -> None:
         weights = np.maximum(np.asarray(weights, dtype=np.float64), 0.0)
         self._weights = weights + (_FLAT_WEIGHT * weights.mean() if np.any(weights) else 1.0)
-        self._group_weights = np.asarray(group_weights, dtype=np.float64)
+        groups = np.maximum(np.asarray(group_weights, dtype=np.float64), 0.0)
+        self._group_weights = np.maximum(groups, _LEAST_GROUP_WEIGHT * groups.max()) if np.any(groups) else groups + 1.0
         self._spectra = spectra
         self._groups = {name: number for number, name in enumerate(surfaces.groups)}
         self._powers: dict[int, float] = {}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 from light_scenes import NO_NORMAL, UP, Lit, lamps, placed, rectangle
@@ -367,14 +365,23 @@ def test_no_lights_at_all_give_densities_of_zero(mi) -> None:
 
 
 def test_group_weights_move_choices_and_not_results(mi) -> None:
-    surfaces = dataclasses.replace(
-        lamps(
-            np.concatenate([rectangle(0.2, 2.0, (-1, 0)), rectangle(0.2, 2.0, (1, 0))]), radiance=[1.0, 1.0], groups=["a", "b"]
-        )
+    surfaces = lamps(
+        np.concatenate([rectangle(0.2, 2.0, (-1, 0)), rectangle(0.2, 2.0, (1, 0))]), radiance=[1.0, 1.0], groups=["a", "b"]
     )
     even, uneven = Lit.of(mi, surfaces), Lit.of(mi, surfaces, group_weights=[1.0, 9.0])
     assert np.mean(uneven.sample((0, 0, 0), UP).group.numpy() == 1) == pytest.approx(0.9, abs=0.01)
     assert even.irradiance((0, 0, 0)) == pytest.approx(uneven.irradiance((0, 0, 0), lanes=2**18), rel=2 * CLOSED_FORM)
+
+
+def test_a_group_of_weight_zero_is_still_lit(mi) -> None:
+    surfaces = lamps(rectangle(0.2, 2.0), groups=["a"])
+    dark, even = Lit.of(mi, surfaces, group_weights=[0.0]), Lit.of(mi, surfaces)
+    assert dark.irradiance((0, 0, 0)) == pytest.approx(even.irradiance((0, 0, 0)), rel=CLOSED_FORM)
+    two = lamps(
+        np.concatenate([rectangle(0.2, 2.0, (-1, 0)), rectangle(0.2, 2.0, (1, 0))]), radiance=[1.0, 1.0], groups=["a", "b"]
+    )
+    sample = Lit.of(mi, two, group_weights=[1.0, 0.0]).sample((0, 0, 0), UP)
+    assert 0 < np.mean(sample.group.numpy() == 1) < 0.01
 
 
 def test_another_scene_of_the_same_kinds_compiles_nothing(mi) -> None:
