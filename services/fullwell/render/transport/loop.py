@@ -192,6 +192,7 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
     cells = dr.llvm.ad.ArrayXu([dr.zeros(mi.UInt32, lanes) for _ in range(count)])
     throughput = zeros()
     radiance = [zeros() for _ in range(self._groups)]
+    last_point = dr.zeros(mi.Point3f, lanes)
     last_normal = dr.zeros(mi.Vector3f, lanes)
     last_density = dr.zeros(mi.Float, lanes)
     depth = dr.zeros(mi.UInt32, lanes)
@@ -208,6 +209,7 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
             radiance = [spectral([mi.Float(0) for _ in range(count)]) for _ in range(self._groups)]
             last_density = mi.Float(0)  # nothing but the camera ray itself could have found what it hits
             last_normal = mi.Vector3f(0)
+            last_point = mi.Point3f(0)
             depth = mi.UInt32(0)
             eta = mi.Float(1)
         cell_list = [cells[k] for k in range(count)]
@@ -224,7 +226,7 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
             if shines:
                 row, group = self._lights.hit_emission(hit.leaf, shines)
                 other = self._lights.hit_density(
-                    hit.leaf, origin, last_normal, direction, hit.distance, hit.front_normal, shines & (last_density > 0)
+                    hit.leaf, last_point, last_normal, direction, hit.distance, hit.front_normal, shines & (last_density > 0)
                 )
                 share = dr.select(last_density > 0, last_density / (last_density + other), 1.0)
                 radiance = self._added(
@@ -280,6 +282,7 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
             direction = onward
             last_density = dr.select(bounce.delta, 0.0, bounce.pdf)
             last_normal = bound
+            last_point = hit.point
 
         if finished:
             good = dr.full(mi.Mask, True, lanes)
