@@ -313,9 +313,13 @@ class CyclesEngine:
 
 def _efficiency(engine: Engine, frame: FrameDescription, samples: int, reference_s: float) -> dict[str, Any]:
     """Return relMSE of the luminance after `samples`, against the engine's own long run, and their product with the time."""
-    reference = extend_reference(frame, engine, seconds=reference_s, samples_per_pass=max(64, samples))
+    cycles = isinstance(engine, CyclesEngine)
+    # A pass of Cycles starts a process and loads the scene: few long ones.
+    per_pass = max(512 if cycles else 64, samples)
+    reference = extend_reference(frame, engine, seconds=reference_s, samples_per_pass=per_pass)
     result = engine.render(frame, Budget(samples, seed=1234567))
-    result = engine.render(frame, Budget(samples, seed=7654321)) if engine.name.startswith("mitsuba") else result
+    if not cycles:  # the first call has compiled what was not in the cache of kernels
+        result = engine.render(frame, Budget(samples, seed=7654321))
     images = [
         luminance(image, frame.grid) if result.kind == "bands" else image[..., 0] for image in (result.image, reference.image)
     ]
