@@ -42,7 +42,7 @@ def conductor(dr: Any, cosine: Any, eta: Any, k: Any) -> Any:
 
     References
     ----------
-    pharr2023, section 9.3.6 (the same as born1999, section 14.2).
+    Born and Wolf 1999, Principles of Optics, 7th ed., section 14.2, squared moduli written without complex numbers.
     """
     cosine_2 = dr.square(cosine)
     sine_2 = 1.0 - cosine_2

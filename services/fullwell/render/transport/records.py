@@ -38,7 +38,7 @@ _WIDE_FROM_ALPHA = (0.02, 0.1)
 smooth ones lose light at grazing incidence only, and a wide lobe that holds it would be a rare bright one."""
 
 _GLASS_RANGE_NM = (380.0, 1000.0)
-"""Between its indices at these, the albedo of dispersive rough glass is linear in the index to 1e-4."""
+"""Between its indices at these, the albedo of dispersive rough glass is taken as linear in the index."""
 
 
 @dataclass(slots=True)
