@@ -63,17 +63,27 @@ def luminance(photons: NDArray[np.floating], grid: WavelengthGrid) -> NDArray[np
 
 
 def luminance_relative_mse(
-    measured: NDArray[np.floating], reference: NDArray[np.floating], *, clip_percentile: float = 100.0
+    measured: NDArray[np.floating],
+    reference: NDArray[np.floating],
+    *,
+    clip_percentile: float = 100.0,
+    trimmed_fraction: float = 0.0,
 ) -> float:
-    """Return the relative mean square error of two luminance images (rows, cols) after each has the mean 1.
+    """Return the relative mean square error of a luminance image (rows, cols), in any unit, against its reference.
 
-    Renderers with other units, or that see other spectra, are so compared by their noise. Pixels above `clip_percentile` of
-    the reference (lamps seen directly) do not count.
+    Parameters
+    ----------
+    clip_percentile
+        Pixels above this percentile of the reference (lamps seen directly) do not count.
+    trimmed_fraction
+        Share of the pixels, those with the largest errors, that is left out. A few fireflies otherwise decide the mean, and
+        another seed has others.
     """
     truth, other = (np.asarray(image, dtype=np.float64) for image in (reference, measured))
     seen = truth <= np.percentile(truth, clip_percentile)
-    truth, other = truth[seen] / truth[seen].mean(), other[seen] / other[seen].mean()
-    return float(np.mean((other - truth) ** 2 / (truth**2 + RELATIVE_FLOOR**2)))
+    truth, other = truth[seen], other[seen]
+    errors = np.sort((other - truth) ** 2 / (truth**2 + (RELATIVE_FLOOR * truth.mean()) ** 2))
+    return float(errors[: max(1, round(errors.size * (1 - trimmed_fraction)))].mean())
 
 
 # Sensor --------------------------------------------------------------------------------------------------------------

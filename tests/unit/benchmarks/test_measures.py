@@ -36,8 +36,21 @@ def test_a_black_band_has_no_relative_error() -> None:
 
 
 def test_luminance_error_does_not_depend_on_the_unit() -> None:
-    truth = np.random.Generator(np.random.Philox(3)).uniform(1, 2, (20, 30))
-    assert measures.luminance_relative_mse(7.5 * truth, truth) == pytest.approx(0.0, abs=EXACT)
+    rng = np.random.Generator(np.random.Philox(3))
+    truth, measured = rng.uniform(1, 2, (2, 20, 30))
+    error = measures.luminance_relative_mse(measured, truth)
+    assert error > 0
+    assert measures.luminance_relative_mse(7.5 * measured, 7.5 * truth) == pytest.approx(error, rel=EXACT)
+
+
+def test_trimming_leaves_out_the_largest_errors_and_clipping_the_brightest_pixels() -> None:
+    truth = np.ones((10, 10))
+    measured = truth + 0.1
+    measured[3, 4] = 1000.0
+    usual = 0.01 / (1 + measures.RELATIVE_FLOOR**2)
+    assert measures.luminance_relative_mse(measured, truth, trimmed_fraction=0.01) == pytest.approx(usual, rel=1e-9)
+    truth[3, 4] = 900.0
+    assert measures.luminance_relative_mse(measured, truth, clip_percentile=99.0) == pytest.approx(usual, rel=1e-9)
 
 
 def test_the_noise_is_shot_and_dark_noise_added_in_squares() -> None:
