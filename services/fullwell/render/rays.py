@@ -20,6 +20,8 @@ class CameraRays:
         import drjit as dr  # noqa: PLC0415 - the renderer is loaded late
 
         self._mi, self._dr = mi, dr
+        self.kind = camera.lens.kind
+        """What the code of the rays depends on."""
         self._pinhole = camera.lens.kind == "pinhole"
         self._pitch = self._data(camera.tangent_pitch)
         self._centre_x, self._centre_y = self._data(camera.film.cols / 2), self._data(camera.film.rows / 2)

@@ -35,7 +35,7 @@ class Launch:
     Not a dataclass: Dr.Jit would take it for loop state.
     """
 
-    def __init__(self, *, pixel: Any, seed: Any, first: Any, count: Any, offset: Any) -> None:
+    def __init__(self, pixel: Any, seed: Any, first: Any, count: Any, offset: Any) -> None:
         self.pixel, self.seed, self.first, self.count, self.offset = pixel, seed, first, count, offset
 
 
@@ -88,6 +88,13 @@ class PathLoop:
         self._mi, self._dr = mi, dr
         self._geometry, self._materials, self._lights = geometry, materials, lights
         self._wavelengths, self._channels, self._groups, self._bands = wavelengths, channels, groups, bands
+
+    @property
+    def kind(self) -> tuple[Any, ...]:
+        """What the compiled code depends on."""
+        parts = (self._geometry, self._materials, self._lights)
+        features = tuple(tuple(sorted(part.features)) for part in parts)
+        return features, self._lights.count > 0, self._wavelengths, self._channels, self._groups, self._bands
 
     def trace(self, scene: Any, camera: CameraRays, tables: Tables, launch: Launch) -> PathSums:
         """Return the sums of a launch.

@@ -15,16 +15,17 @@ from fullwell.core.errors import CancelledError, RenderError
 from fullwell.core.rng import seed32
 from fullwell.radiometry import Spectrum, WavelengthGrid
 from fullwell.render.rays import CameraRays
-from fullwell.render.transport.collect import collect_surfaces, light_groups
+from fullwell.render.transport.collect import collect_surfaces
 from fullwell.render.transport.geometry import Geometry
 from fullwell.render.transport.lights import LightSet
-from fullwell.render.transport.loop import SLOTS, Launch, PathLoop
+from fullwell.render.transport.loop import SLOTS, Launch, PathLoop, PathSums
 from fullwell.render.transport.materials import MaterialTable
+from fullwell.render.transport.replay import device_arrays, replayed
 from fullwell.render.transport.upload import upload
 from fullwell.render.transport.wavelengths import CELL_COUNT, CELL_NM, SpectraTable, cell_centres_nm, cell_means
 from fullwell.scene import Camera, SceneDescription
 
-__all__ = ["REPLICAS", "ProgressiveImage", "Reporter", "Work", "check_samples", "light_groups"]
+__all__ = ["REPLICAS", "ProgressiveImage", "Reporter", "Work", "check_samples"]
 
 REPLICAS = 4
 """Independent sequences per pixel. The spread of their means is the error of the image: each is stratified over all its
@@ -140,6 +141,8 @@ class ProgressiveImage:
         self.bad_samples = 0
         self.segments = 0
         self.cpu_s = 0.0
+        self._clamped = 0.0
+        self._inputs: list[Any] | None = None
 
     # What is there ---------------------------------------------------------------------------------------------------
 
@@ -175,6 +178,26 @@ class ProgressiveImage:
         """Raise RenderError where too many samples were no numbers, or where the light exceeds single precision."""
         sums = (self._sums,) if self._band_sums is None else (self._sums, self._band_sums)
         check_samples(self.bad_samples, self.samples, sums, int(self.counts.max()))
+
+    @property
+    def clamped_fraction(self) -> float:
+        """Share of the channels' light that the clamp took away."""
+        return self._clamped / max(self._clamped + float(self._sums.sum()), 1e-300)
+
+    def restart(self, clamp: NDArray[np.float64]) -> None:
+        """Forget all samples; from now on clamp each to `clamp`, (channels,) of light."""
+        self.counts[:] = 0
+        self._sums[:] = 0.0
+        if self._band_sums is not None:
+            self._band_sums[:] = 0.0
+        self.bad_samples, self.segments, self._clamped = 0, 0, 0.0
+        self._tables["inverse_clamp"] = self._inverse_clamp(clamp)
+        self._inputs = None
+
+    def _inverse_clamp(self, clamp: NDArray[np.float64]) -> list[Any]:
+        import drjit as dr  # noqa: PLC0415
+
+        return [dr.opaque(self._mi.Float, float(1.0 / limit)) for limit in clamp]
 
     # More of it ------------------------------------------------------------------------------------------------------
 
@@ -215,8 +238,8 @@ class ProgressiveImage:
             count=by_lane(counts),
             offset=upload(mi.UInt32, self._offsets[np.repeat(pixels, REPLICAS), replica]),
         )
-        sums = self._loop.trace(self._geometry.scene, self._camera, self._tables, launch)
-        dr.eval(sums.channels, sums.bands, sums.bad, sums.segments)
+        sums = self._traced(launch)
+        dr.eval(sums.channels, sums.bands, sums.bad, sums.segments, sums.clamped)
         shape = (len(pixels), REPLICAS)
         for group, channels in enumerate(sums.channels):
             for channel, values in enumerate(channels):
@@ -226,8 +249,22 @@ class ProgressiveImage:
             by_band = np.asarray(sums.bands.numpy()).reshape(*shape, len(self.groups), -1)
             self._band_sums[pixels] += by_band.sum(axis=1, dtype=np.float64)
         self.bad_samples += int(np.sum(sums.bad.numpy()))
+        self._clamped += float(np.sum(sums.clamped.numpy(), dtype=np.float64))
         self.segments += int(np.sum(sums.segments.numpy(), dtype=np.int64))
         self.counts[pixels] += counts
+
+    def _traced(self, launch: Launch) -> PathSums:
+        """Return the sums of a launch, replayed where one of its kind was recorded before."""
+        if self._inputs is None:
+            self._inputs = device_arrays(self._loop, self._camera, self._tables)
+
+        def function(scene: Any, *lanes: Any) -> Any:
+            sums = self._loop.trace(scene, self._camera, self._tables, Launch(*lanes))
+            return sums.channels, sums.bands, sums.bad, sums.segments, sums.clamped
+
+        kind = (self._loop.kind, self._camera.kind, self._work.grid.count)
+        lanes = (launch.pixel, launch.seed, launch.first, launch.count, launch.offset)
+        return PathSums(*replayed(kind, function, self._geometry.scene, self._inputs, *lanes))
 
     # Tables ----------------------------------------------------------------------------------------------------------
 
@@ -271,6 +308,7 @@ class ProgressiveImage:
             "band_first_nm": dr.opaque(mi.Float, float(edges[0])),
             "band_step_nm": dr.opaque(mi.Float, float(work.grid.step_nm)),
             "band_shifts": [dr.opaque(mi.UInt32, shift) for shift in self._band_shifts()],
+            "inverse_clamp": self._inverse_clamp(np.full(len(work.responses), np.inf)),
             "photons_per_j_nm": dr.opaque(mi.Float, _PHOTONS_PER_J_NM),
         }
 

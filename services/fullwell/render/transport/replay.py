@@ -1,0 +1,66 @@
+"""Launches of the path loop replayed from a recording: tracing the loop's Python takes longer than small launches run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from typing import Any
+
+__all__ = ["device_arrays", "replayed"]
+
+_recordings: dict[Hashable, tuple[Any, list[Callable[..., Any]]]] = {}
+"""By kind of kernel: the frozen function, and what it calls when it has to record."""
+
+
+def replayed(kind: Hashable, function: Callable[..., Any], scene: Any, arrays: list[Any], *arguments: Any) -> Any:
+    """Return ``function(scene, *arguments)`` from the recording of its kind, made now where there is none that fits.
+
+    `kind` names everything about `function` that is not in its arguments or in `arrays`, the device arrays that it reads from
+    elsewhere. All scenes of a kind share one recording: their numbers are in these arrays, never in the code.
+    """
+    import drjit as dr  # noqa: PLC0415 - the renderer is loaded late
+
+    known = _recordings.get(kind)
+    if known is None:
+        holder: list[Callable[..., Any]] = []
+
+        def record(scene: Any, arrays: list[Any], *arguments: Any) -> Any:
+            del arrays  # what `function` reads by itself; named here so that the recording takes them as inputs
+            return holder[0](scene, *arguments)
+
+        known = _recordings[kind] = (dr.freeze(record), holder)
+    frozen, holder = known
+    holder[:] = [function]
+    try:
+        return frozen(scene, arrays, *arguments)
+    finally:
+        holder.clear()
+
+
+def device_arrays(*objects: Any) -> list[Any]:
+    """Return the Dr.Jit arrays that the package's own objects hold, each once, in an order that their structure decides."""
+    import drjit as dr  # noqa: PLC0415
+
+    seen: set[int] = set()
+    found: list[Any] = []
+
+    def visit(value: Any) -> None:
+        if id(value) in seen:
+            return
+        if dr.is_array_v(value):
+            seen.add(id(value))
+            found.append(value)
+        elif isinstance(value, list | tuple):
+            for item in value:
+                visit(item)
+        elif isinstance(value, dict):
+            for name in sorted(value):
+                visit(value[name])
+        elif type(value).__module__.startswith("fullwell.render"):
+            seen.add(id(value))
+            names = getattr(value, "__dict__", None) or dict.fromkeys(getattr(value, "__slots__", ()))
+            for name in sorted(names):
+                visit(getattr(value, name, None))
+
+    for item in objects:
+        visit(item)
+    return found
