@@ -29,7 +29,7 @@ __all__ = [
 NODE_COUNT = 256
 
 _KNOT_COUNT = 48
-_ALPHA_COUNT = 48
+_ALPHA_COUNT = 32
 _LOG_RANGE = -np.log(POLISHED_BELOW)
 _SMALLEST_MU = 1e-5
 _ROUGH = 0.2
@@ -114,7 +114,7 @@ def _alpha(number: int) -> float:
 @functools.lru_cache(maxsize=4096)
 def _metal_knots(number: int) -> _Row:
     alpha = _alpha(number)
-    return _at_knots(alpha, 1.0, (96, 32), _mirrored(alpha, None))
+    return _at_knots(alpha, 1.0, (64, 24), _mirrored(alpha, None))
 
 
 @functools.lru_cache(maxsize=4096)
@@ -185,8 +185,11 @@ def _visible(mu: _Row, alpha: float, index: float, points: tuple[int, int]) -> t
 
 @functools.cache
 def _unit_gauss(count: int) -> tuple[_Row, _Row]:
-    nodes, weights = np.polynomial.legendre.leggauss(count)
-    return 0.5 * (nodes + 1.0), 0.5 * weights
+    """Return Gauss points in [0, 1], in panels of at most 256: finding them takes the cube of their number."""
+    panels = -(-count // 256)
+    nodes, weights = np.polynomial.legendre.leggauss(count // panels)
+    inside = (np.arange(panels)[:, None] + 0.5 * (nodes + 1.0)) / panels
+    return inside.ravel(), np.tile(0.5 * weights / panels, panels)
 
 
 def _towards_one(count: int) -> tuple[_Row, _Row]:

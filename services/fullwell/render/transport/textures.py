@@ -24,6 +24,10 @@ _CERTAIN = 1e4
 """Stands for the infinite coefficient of pure black and white; the sigmoid is 0 or 1 to single precision."""
 
 
+_AT_ONCE = 1 << 14
+"""Colours whose intermediate results stay in the processor's cache."""
+
+
 @dataclass(frozen=True, slots=True)
 class Placed:
     """Where a texture's texels start in the atlas, and its size."""
@@ -72,23 +76,34 @@ def coefficients_of_srgb(encoded: NDArray[np.uint8]) -> NDArray[np.float32]:
     ----------
     jakob2019, section 4 (the table and its lookup).
     """
-    linear = srgb_to_linear(encoded / 255.0)
+    parts = [_coefficients(encoded[start : start + _AT_ONCE]) for start in range(0, len(encoded), _AT_ONCE)]
+    return np.concatenate(parts) if parts else np.zeros((0, 3), dtype=np.float32)
+
+
+def _coefficients(encoded: NDArray[np.uint8]) -> NDArray[np.float32]:
+    linear = _decoded()[encoded]
     scale, table = _model()
     size = scale.size
-    largest = np.argmax(linear[:, ::-1], axis=1)
-    largest = 2 - largest  # of equal components the last counts
+    largest = 2 - np.argmax(linear[:, ::-1], axis=1)  # of equal components the last counts
     rows = np.arange(len(linear))
     z = linear[rows, largest]
     shrink = (size - 1) / np.maximum(z, 1e-30)
     x, y = (linear[rows, (largest + shift) % 3] * shrink for shift in (1, 2))
-    found = np.clip(np.searchsorted(scale, z, side="right") - 1, 0, size - 2)
+    k = np.clip(np.searchsorted(scale, z, side="right") - 1, 0, size - 2)
     i, j = np.minimum(x.astype(int), size - 2), np.minimum(y.astype(int), size - 2)
-    u, v, w = x - i, y - j, (z - scale[found]) / (scale[found + 1] - scale[found])
+    u, v, w = x - i, y - j, (z - scale[k]) / (scale[k + 1] - scale[k])
+    first = ((largest * size + k) * size + j) * size + i
     result = np.zeros((len(linear), 3))
-    for di, dj, dk in np.ndindex(2, 2, 2):
+    for dk, dj, di in np.ndindex(2, 2, 2):
         weight = (u if di else 1 - u) * (v if dj else 1 - v) * (w if dk else 1 - w)
-        result += weight[:, None] * table[largest, found + dk, j + dj, i + di]
+        result += weight[:, None] * table[first + (dk * size + dj) * size + di]
     return _with_exact_greys(linear, result).astype(np.float32)
+
+
+@functools.cache
+def _decoded() -> NDArray[np.float64]:
+    """Return the linear value of each of the 256 encoded ones."""
+    return srgb_to_linear(np.arange(256) / 255.0)
 
 
 def _with_exact_greys(linear: NDArray[np.float64], coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -104,7 +119,7 @@ def _with_exact_greys(linear: NDArray[np.float64], coefficients: NDArray[np.floa
 
 @functools.cache
 def _model() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the table's scale (size,) and its coefficients (largest component, scale, y, x, 3)."""
+    """Return the table's scale (size,) and its coefficients (n, 3), in the order of largest component, scale, y, x."""
     import mitsuba  # noqa: PLC0415 - the renderer is loaded late
 
     path = Path(str(mitsuba.__file__)).parent / "data" / "srgb.coeff"
@@ -114,7 +129,7 @@ def _model() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         raise RenderError(f"{path} is not a table of colour coefficients. Reinstall mitsuba.")
     scale = np.frombuffer(content, dtype="<f4", count=size, offset=8).astype(np.float64)
     table = np.frombuffer(content, dtype="<f4", count=9 * size**3, offset=8 + 4 * size).astype(np.float64)
-    return scale, table.reshape(3, size, size, size, 3)
+    return scale, table.reshape(-1, 3)
 
 
 def texel_of(mi: Any, dr: Any, uv: Any, u: Any, *, rows: Any, cols: Any) -> Any:
