@@ -427,3 +427,27 @@ class TestLimits:
                 assert np.isfinite(np.array(result)).all()
             for result in (drawn.weight, drawn.pdf, value, density):
                 assert (np.array(result) >= 0).all()
+
+
+class TestCompilation:
+    def test_other_materials_of_the_same_features_compile_nothing(self) -> None:
+        import drjit as dr
+
+        def compiled(materials: list[Material], cosine: float) -> int:
+            bench = Bench(materials)
+            u = spread_numbers(1 << 10)
+            lanes = np.arange(1 << 10) % len(materials)
+            wi = bench.vectors(np.tile(towards(cosine), (1 << 10, 1)))
+            numbers = (bench.mi.Float(u[:, 0]), bench.mi.Point2f(np.ascontiguousarray(u[:, 1:].T, dtype=np.float32)))
+            surface = bench.surface(lanes)
+            drawn = surface.sample(wi, *numbers)
+            value, density = surface.evaluate(wi, drawn.wo)
+            dr.kernel_history_clear()
+            with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+                dr.eval(drawn.weight, drawn.pdf, value, density)
+                history = dr.kernel_history([dr.KernelType.JIT])
+            return sum(not kernel["cache_hit"] for kernel in history)
+
+        compiled([RoughPlastic(RAMP, 0.1), Conductor(*metal("gold"), 0.3), Dielectric(glass("F2"), 1.0, 0.2)], 0.8)
+        others = [Principled(ONE, 0.5, 0.3), Diffuse(ZERO), Dielectric(1.4), Dielectric(glass("water"), 1.0, 0.5), Mirror(RAMP)]
+        assert compiled(others, 0.3) == 0
