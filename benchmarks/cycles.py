@@ -2,9 +2,9 @@
 
 Cycles is a development tool here, no dependency: Blender is under the GPL and large. Put it into an environment of its own,
 
-    python3.11 -m venv /tmp/bpy-venv && /tmp/bpy-venv/bin/pip install bpy==5.0.1
+    python3.11 -m venv ~/bpy-venv && ~/bpy-venv/bin/pip install bpy==5.0.1
 
-and name its interpreter in FULLWELL_BENCH_BPY (default /tmp/bpy-venv/bin/python). Then
+and name its interpreter in FULLWELL_BENCH_BPY (default ~/bpy-venv/bin/python). Then
 python -m benchmarks.cycles [--scene NAME] [--size 160x120] [--samples 64] [--reference-seconds 40]
 prints for each scene the CPU-seconds that Cycles and Mitsuba need for the same relative error of the luminance.
 
@@ -284,7 +284,7 @@ class CyclesEngine:
     """Cycles in a child process. The time is that of a render of N samples less one of a single sample: no start-up."""
 
     light_tree: bool = True
-    python: str = os.environ.get("FULLWELL_BENCH_BPY", "/tmp/bpy-venv/bin/python")
+    python: str = os.environ.get("FULLWELL_BENCH_BPY") or str(Path.home() / "bpy-venv" / "bin" / "python")
 
     @property
     def name(self) -> str:
