@@ -202,10 +202,12 @@ def _choose_form(
     bands = f"{frame.grid.count} bands, {edges[0]:g}-{edges[-1]:g} nm"
     asked = sorted(_SPECTRAL_PRODUCTS & set(frame.outputs))
     reason, bound = "", 0.0
-    responses, places = _responses(frame.grid, rig, sensors, 1)
+    whole = _responses(frame.grid, rig, sensors, 1)
+    responses, places = whole
+    needs_spectra = not channels_suffice(rig.optics) or rig.depth_layers
     if rig.model == "isetcam":
         reason = "ISETCam's camera works on bands"
-    elif not channels_suffice(rig.optics) or rig.depth_layers:
+    elif needs_spectra and not asked:
         reason = "the lens's point image depends on the wavelength"
     else:
         for parts in range(1, _MOST_PARTS + 1):
@@ -217,10 +219,11 @@ def _choose_form(
             reason = f"diffraction differs within a channel: contrast by up to {bound:.2g} at Nyquist"
         elif len(responses) > _MOST_RESPONSES:
             reason = f"the sensors have {len(responses)} different responses; up to {_MOST_RESPONSES} are counted directly"
-    direct = not reason and skip
-    if not direct:
-        responses, places = _responses(frame.grid, rig, sensors, 1)
-        responses = responses[:_MOST_RESPONSES]
+    direct = not (reason or needs_spectra) and skip
+    if reason or not skip:
+        responses, places = whole[0][:_MOST_RESPONSES], whole[1]
+    elif needs_spectra:  # the same light as for a lens without: it is not rendered again for another one
+        reason = "the lens's point image depends on the wavelength"
     if direct and not asked:
         low, high = _support(frame, responses)
         why = f"{len(responses)} responses are counted directly; only {low:g}-{high:g} nm reach one"

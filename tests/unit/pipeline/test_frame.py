@@ -15,7 +15,7 @@ import pytest
 from fullwell.core.errors import CancelledError, ConflictError
 from fullwell.core.hashing import sha256_hex
 from fullwell.dataset import encode
-from fullwell.pipeline import FrameProgress, RadianceCache, plan_frame, render_frame, run_frame
+from fullwell.pipeline import FrameProgress, LightCache, plan_frame, render_frame, run_frame
 from fullwell.schema import build_frame, load_recipe
 from fullwell.storage import LocalStore
 
@@ -101,7 +101,7 @@ def test_published_frame_is_returned_without_work(
     recipe: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first, _ = make(recipe, tmp_path)
-    monkeypatch.setattr("fullwell.pipeline.frame.render_radiance", None)
+    monkeypatch.setattr("fullwell.pipeline.frame.render_light", None)
     again, _ = make(recipe, tmp_path)
     assert again == json.loads(json.dumps(first))
 
@@ -139,7 +139,7 @@ def test_progress_grows_from_zero_to_one(recipe: dict[str, Any], tmp_path: Path)
 
 
 def test_labels_alone_render_nothing(recipe: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fullwell.pipeline.frame.render_radiance", None)
+    monkeypatch.setattr("fullwell.pipeline.frame.render_light", None)
     manifest, _ = make(recipe | {"outputs": ["instances.png", "labels.json"]}, tmp_path)
     skipped = {step["what"] for step in manifest["plan"] if step["decision"] == "skip"}
     assert {"radiance", "optics", "sensor", "display"} <= skipped
@@ -149,15 +149,15 @@ def test_sweep_over_exposure_renders_once(recipe: dict[str, Any], tmp_path: Path
     import fullwell.pipeline.frame as frame_module
 
     calls: list[int] = []
-    original = frame_module.render_radiance
+    original = frame_module.render_light
 
     def counted(*args: Any, **options: Any) -> Any:
         calls.append(1)
         return original(*args, **options)
 
-    monkeypatch.setattr(frame_module, "render_radiance", counted)
+    monkeypatch.setattr(frame_module, "render_light", counted)
     swept = recipe | {"vary": {"grid": {"cameras[0].sensors[0].exposure.time_s": [0.001, 0.004]}}}
-    document, store, cache = load_recipe(swept), LocalStore(tmp_path), RadianceCache()
+    document, store, cache = load_recipe(swept), LocalStore(tmp_path), LightCache()
     manifests = [render_frame(build_frame(document, i), store, f"f/{i}", cache=cache) for i in range(2)]
     assert len(calls) == 1
     electrons = [m["cameras"][0]["sensors"][0]["mean_electrons"] for m in manifests]

@@ -11,13 +11,13 @@ import pytest
 
 from fullwell.dataset import encode
 from fullwell.optics import gaussian_psf, write_psf
-from fullwell.pipeline import RadianceCache, plan_frame, render_frame
+from fullwell.pipeline import LightCache, plan_frame, render_frame
 from fullwell.schema import RecipeError, build_frame, load_recipe
 from fullwell.storage import LocalStore
 
 
 def irradiance(
-    recipe: dict[str, Any], folder: Path, *, base_dir: Path | None = None, cache: RadianceCache | None = None, **lens: Any
+    recipe: dict[str, Any], folder: Path, *, base_dir: Path | None = None, cache: LightCache | None = None, **lens: Any
 ) -> np.ndarray:
     changed = copy.deepcopy(recipe) | {"outputs": ["irradiance.exr"]}
     changed["cameras"][0]["lens"] |= lens
@@ -42,7 +42,7 @@ BLURS: list[dict[str, Any]] = [
 def test_blur_of_the_lens_lowers_contrast_and_keeps_the_light(
     recipe: dict[str, Any], tmp_path: Path, blur: dict[str, Any]
 ) -> None:
-    cache = RadianceCache()
+    cache = LightCache()
     sharp = irradiance(recipe, tmp_path, cache=cache)
     blurred = irradiance(recipe, tmp_path, cache=cache, **blur)
     assert contrast(blurred) < 0.9 * contrast(sharp)
@@ -50,7 +50,7 @@ def test_blur_of_the_lens_lowers_contrast_and_keeps_the_light(
 
 
 def test_aperture_blades_and_dust_spread_light(recipe: dict[str, Any], tmp_path: Path) -> None:
-    cache = RadianceCache()
+    cache = LightCache()
     clean = irradiance(recipe, tmp_path, cache=cache)
     flared = irradiance(recipe, tmp_path, cache=cache, aperture={"blades": 6, "scratches": 50, "dust_grains": 20})
     assert not np.array_equal(clean, flared)
@@ -59,7 +59,7 @@ def test_aperture_blades_and_dust_spread_light(recipe: dict[str, Any], tmp_path:
 
 def test_point_image_from_a_file_is_the_same_as_the_built_in_one(recipe: dict[str, Any], tmp_path: Path) -> None:
     write_psf(tmp_path / "lens.npz", gaussian_psf(4e-6))
-    cache = RadianceCache()
+    cache = LightCache()
     built_in = irradiance(recipe, tmp_path, cache=cache, psf={"gaussian_sigma_m": 4e-6})
     from_file = irradiance(recipe, tmp_path, cache=cache, base_dir=tmp_path, psf={"file": "lens.npz"})
     assert from_file == pytest.approx(built_in, rel=1e-6)

@@ -11,6 +11,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -21,31 +22,46 @@ import fullwell.pipeline.frame as frame_module
 from fullwell.core.errors import ConflictError, FieldError, RenderError, StorageError
 from fullwell.core.settings import load_settings
 from fullwell.dataset import encode
-from fullwell.pipeline import RadianceCache, StageStore, plan_frame, render_frame, with_cache_steps
+from fullwell.pipeline import LightCache, StageStore, plan_frame, render_frame, with_cache_steps
 from fullwell.pipeline import cache as cache_module
-from fullwell.pipeline.cache import decode_radiance, encode_radiance, obtain_radiance, stored_radiance_key
-from fullwell.radiometry import RadianceImage, WavelengthGrid
-from fullwell.render import RenderStatistics
+from fullwell.pipeline.cache import decode_light, encode_light, obtain_light, stored_light_key
+from fullwell.radiometry import WavelengthGrid
+from fullwell.render import RenderedLight, RenderStatistics
 from fullwell.schema import build_frame, load_recipe
 from fullwell.storage import LocalStore, ObjectInfo, ObjectStore, store_from_url
 from servers import S3Server
 
 LIMIT = 1 << 30
-STATISTICS = RenderStatistics(8, 2, 1, 1.25, 2.5, "llvm_ad_spectral")
+STATISTICS = RenderStatistics(
+    8.5,
+    2,
+    1,
+    1.25,
+    2.5,
+    "llvm_ad_spectral",
+    samples_min=4,
+    samples_max=16,
+    noise_ratio_rms=0.1,
+    unmet_tiles=1,
+    stopped_by="time",
+)
 KEY = "ab" * 32
+KIND = cache_module.KIND
+SHAPES = (4, 2, 3, 3, 4), (2, 3, 4, 4)
+"""Of `small_light()`: (replicas, groups, channels, rows, cols) and (groups, rows, cols, bands)."""
 
 
 @pytest.fixture
 def renders(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """One item per rendering."""
     calls: list[int] = []
-    original = frame_module.render_radiance
+    original = frame_module.render_light
 
     def counted(*args: Any, **options: Any) -> Any:
         calls.append(1)
         return original(*args, **options)
 
-    monkeypatch.setattr(frame_module, "render_radiance", counted)
+    monkeypatch.setattr(frame_module, "render_light", counted)
     return calls
 
 
@@ -61,52 +77,75 @@ def make(recipe: dict[str, Any], store: ObjectStore, prefix: str, *, index: int 
     """Make a frame as a new process would: nothing in memory."""
     stages = StageStore(store, max_bytes=LIMIT) if cached else None
     frame = build_frame(load_recipe(recipe), index)
-    return render_frame(frame, store, prefix, cache=RadianceCache(), stages=stages)
+    return render_frame(frame, store, prefix, cache=LightCache(), stages=stages)
 
 
 def results(manifest: dict[str, Any]) -> list[tuple[str, str]]:
     return [(entry["result"], entry["source"]) for entry in manifest["run"]["cache"]]
 
 
-def small_image(rows: int = 3, cols: int = 4, *, error: bool = True) -> RadianceImage:
+def small_light(rows: int = 3, cols: int = 4, *, bands: bool = True) -> RenderedLight:
     rng = np.random.default_rng(1)
     grid = WavelengthGrid(400.0, 700.0, 100.0)
-    photons = rng.random((rows, cols, grid.count), dtype=np.float32) * np.float32(1e17)
-    return RadianceImage(photons, grid, 1.3e-4, rng.random((rows, cols), dtype=np.float32) if error else None)
+    return RenderedLight(
+        replicas=rng.random((4, 2, 3, rows, cols), dtype=np.float32) * np.float32(1e18),
+        bands=rng.random((2, rows, cols, grid.count), dtype=np.float32) * np.float32(1e17) if bands else None,
+        groups=("lamp", "sky"),
+        grid=grid,
+        tangent_pitch=1.3e-4,
+        statistics=STATISTICS,
+    )
+
+
+def same_bytes(one: np.ndarray, other: np.ndarray) -> bool:
+    return one.shape == other.shape and one.dtype == other.dtype and one.tobytes() == other.tobytes()
 
 
 # The encoding --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("error", [True, False])
-def test_encoding_is_exact(error: bool) -> None:
-    image = small_image(error=error)
-    image.photons[0, 0] = [0.0, np.float32(1e-45), np.finfo(np.float32).max, 1 / 3]
-    back, statistics = decode_radiance(b"".join(encode_radiance(image, STATISTICS)))
-    assert back.photons.tobytes() == image.photons.tobytes()
-    assert back.photons.dtype == np.float32
-    assert back.photons.flags.c_contiguous
-    assert back.photons.flags.writeable
-    assert (back.grid, back.tangent_pitch, statistics) == (image.grid, image.tangent_pitch, STATISTICS)
-    if image.standard_error is None:
-        assert back.standard_error is None
-    else:
-        assert back.standard_error is not None
-        assert back.standard_error.tobytes() == image.standard_error.tobytes()
+@pytest.mark.parametrize("bands", [True, False])
+def test_encoding_is_exact(bands: bool) -> None:
+    light = small_light(bands=bands)
+    odd = [0.0, np.float32(1e-45), np.finfo(np.float32).max, 1 / 3]
+    light.replicas[0, 0, 0, 0] = odd
+    if light.bands is not None:
+        light.bands[0, 0, 0] = odd
+    back = decode_light(b"".join(encode_light(light)))
+    for array, original in ((back.replicas, light.replicas), (back.bands, light.bands)):
+        if original is None:
+            assert array is None
+        else:
+            assert array is not None
+            assert same_bytes(array, original)
+            assert array.flags.c_contiguous
+            assert array.flags.writeable
+    assert (back.groups, back.grid, back.tangent_pitch) == (light.groups, light.grid, light.tangent_pitch)
+    assert back.statistics == STATISTICS
 
 
-def test_image_with_strides_is_encoded_in_order() -> None:
-    image = small_image()
-    turned = RadianceImage(image.photons[::-1], image.grid, image.tangent_pitch)
-    back, _ = decode_radiance(b"".join(encode_radiance(turned, STATISTICS)))
-    np.testing.assert_array_equal(back.photons, turned.photons)
+def test_light_with_strides_is_encoded_in_order() -> None:
+    light = small_light()
+    assert light.bands is not None
+    turned = replace(light, replicas=light.replicas[:, :, :, ::-1], bands=light.bands[:, ::-1])
+    back = decode_light(b"".join(encode_light(turned)))
+    assert back.bands is not None
+    np.testing.assert_array_equal(back.replicas, turned.replicas)
+    np.testing.assert_array_equal(back.bands, turned.bands)
 
 
-def test_no_beginning_of_an_encoding_is_taken_for_an_image() -> None:
-    whole = b"".join(encode_radiance(small_image(), STATISTICS))
+def test_light_of_another_precision_is_not_encoded() -> None:
+    light = small_light()
+    with pytest.raises(TypeError, match="float64"):
+        encode_light(replace(light, replicas=light.replicas.astype(np.float64)))
+
+
+@pytest.mark.parametrize("bands", [True, False])
+def test_no_beginning_of_an_encoding_is_taken_for_light(bands: bool) -> None:
+    whole = b"".join(encode_light(small_light(bands=bands)))
     for length in range(len(whole)):
         with pytest.raises(Exception):  # noqa: B017, PT011 - whatever is raised, the caller takes the entry for absent
-            decode_radiance(whole[:length])
+            decode_light(whole[:length])
 
 
 # A hit is as good as a miss ------------------------------------------------------------------------------------------
@@ -152,16 +191,42 @@ def change_lens_blur(camera: dict[str, Any]) -> None:
     camera["lens"]["psf"] = {"gaussian_sigma_m": 4e-6}
 
 
+def change_aperture_blades(camera: dict[str, Any]) -> None:
+    camera["lens"]["aperture"] = {"blades": 6, "scratches": 50}
+
+
 def change_isp(camera: dict[str, Any]) -> None:
     camera["sensors"][0]["isp"] = {"tone": {"exposure_ev": 1.0}}
 
 
-@pytest.mark.parametrize("change", [change_sensor, change_exposure, change_lens_blur, change_isp])
-def test_change_behind_the_radiance_renders_nothing(
+@pytest.mark.parametrize("change", [change_sensor, change_exposure, change_isp])
+def test_change_behind_the_light_renders_nothing(
     recipe: dict[str, Any], tmp_path: Path, renders: list[int], change: Callable[[dict[str, Any]], None]
 ) -> None:
+    check_that_change_renders_nothing(recipe, tmp_path, renders, change, ["raw.npz", "image.png"])
+
+
+def test_lens_blur_renders_nothing_where_the_spectrum_is_kept(
+    recipe: dict[str, Any], tmp_path: Path, renders: list[int]
+) -> None:
+    check_that_change_renders_nothing(recipe, tmp_path, renders, change_lens_blur, ["raw.npz", "image.png", "radiance.exr"])
+
+
+def test_lenses_that_need_the_spectrum_share_one_rendering(recipe: dict[str, Any], tmp_path: Path, renders: list[int]) -> None:
+    change_lens_blur(recipe["cameras"][0])
+
+    def other_blur(camera: dict[str, Any]) -> None:
+        del camera["lens"]["psf"]
+        change_aperture_blades(camera)
+
+    check_that_change_renders_nothing(recipe, tmp_path, renders, other_blur, ["raw.npz", "image.png"])
+
+
+def check_that_change_renders_nothing(
+    recipe: dict[str, Any], tmp_path: Path, renders: list[int], change: Callable[[dict[str, Any]], None], outputs: list[str]
+) -> None:
     store = LocalStore(tmp_path)
-    recipe["outputs"] = ["raw.npz", "image.png"]
+    recipe["outputs"] = outputs
     make(recipe, store, "before")
     changed = copy.deepcopy(recipe)
     change(changed["cameras"][0])
@@ -191,12 +256,12 @@ def test_another_seed_or_scene_renders_anew(recipe: dict[str, Any], tmp_path: Pa
 
 
 def test_other_rendering_code_has_entries_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    before = stored_radiance_key(KEY)
-    assert before == stored_radiance_key(KEY)
+    before = stored_light_key(KEY)
+    assert before == stored_light_key(KEY)
     maker = cache_module._maker()
     for name, other in (("code", "0" * 64), ("llvm", "1.0"), ("instruction_sets", []), ("versions", {"mitsuba": "0"})):
         monkeypatch.setattr(cache_module, "_maker", lambda name=name, other=other: maker | {name: other})
-        assert stored_radiance_key(KEY) != before
+        assert stored_light_key(KEY) != before
 
 
 def test_plan_tells_what_is_kept(recipe: dict[str, Any], tmp_path: Path) -> None:
@@ -269,8 +334,8 @@ def test_store_that_failed_is_left_alone_for_a_while(tmp_path: Path) -> None:
     faulty: Any = FaultyStore(tmp_path, {"get"}, StorageError("away"))
     stages = StageStore(faulty, max_bytes=LIMIT)
     for _ in range(5):
-        assert stages.get("radiance", KEY) is None
-        assert not stages.put("radiance", KEY, b"x")
+        assert stages.get(KIND, KEY) is None
+        assert not stages.put(KIND, KEY, b"x")
     assert faulty.failures == 1
 
 
@@ -292,16 +357,15 @@ def test_damaged_entry_is_rendered_again_and_replaced(
     assert [results(manifest)[0][0] for manifest in (second, third)] == ["miss", "hit"]
 
 
-def test_entry_that_holds_another_shape_is_discarded(tmp_path: Path) -> None:
+@pytest.mark.parametrize("other", [small_light(5, 5), small_light(bands=False)], ids=["size", "no bands"])
+def test_entry_that_holds_another_shape_is_discarded(tmp_path: Path, other: RenderedLight) -> None:
     stages = StageStore(LocalStore(tmp_path), max_bytes=LIMIT)
-    stages.put("radiance", stored_radiance_key(KEY), *encode_radiance(small_image(5, 5), STATISTICS))
-    found = obtain_radiance(
-        KEY, lambda: (small_image(3, 4), STATISTICS), shape=(3, 4, 4), memory=RadianceCache(), stages=stages
-    )
+    stages.put(KIND, stored_light_key(KEY), *encode_light(other))
+    found = obtain_light(KEY, small_light, shapes=SHAPES, memory=LightCache(), stages=stages)
     assert found.source == "render"
-    content = stages.get("radiance", stored_radiance_key(KEY))
+    content = stages.get(KIND, stored_light_key(KEY))
     assert content is not None
-    assert decode_radiance(content)[0].rows == 3
+    assert same_bytes(decode_light(content).replicas, small_light().replicas)
 
 
 def test_rendering_that_fails_is_not_kept_and_holds_nobody_up(tmp_path: Path) -> None:
@@ -311,14 +375,14 @@ def test_rendering_that_fails_is_not_kept_and_holds_nobody_up(tmp_path: Path) ->
     store = LocalStore(tmp_path)
     for _ in range(2):
         with pytest.raises(RenderError):
-            obtain_radiance(KEY, fail, shape=(3, 4, 4), memory=RadianceCache(), stages=StageStore(store, max_bytes=LIMIT))
+            obtain_light(KEY, fail, shapes=SHAPES, memory=LightCache(), stages=StageStore(store, max_bytes=LIMIT))
     assert list(store.list()) == []
 
 
-def test_image_larger_than_the_cache_is_not_waited_for(tmp_path: Path) -> None:
+def test_light_larger_than_the_cache_is_not_waited_for(tmp_path: Path) -> None:
     store = LocalStore(tmp_path)
     stages = StageStore(store, max_bytes=100)
-    found = obtain_radiance(KEY, lambda: (small_image(), STATISTICS), shape=(3, 4, 4), memory=RadianceCache(), stages=stages)
+    found = obtain_light(KEY, small_light, shapes=SHAPES, memory=LightCache(), stages=stages)
     assert (found.source, found.stored_as) == ("render", None)
     assert list(store.list()) == []
 
@@ -332,54 +396,54 @@ def test_least_recently_used_entries_go_first(tmp_path: Path) -> None:
     keys = [hashlib.sha256(bytes([number])).hexdigest() for number in range(5)]
     now = datetime.datetime.now(tz=datetime.UTC).timestamp()
     for age, key in enumerate(keys):
-        writer.put("radiance", key, bytes(1000))
+        writer.put(KIND, key, bytes(1000))
         written = now - 10_000 + age  # the first is the oldest
-        os.utime(tmp_path / writer.address("radiance", key), (written, written))
+        os.utime(tmp_path / writer.address(KIND, key), (written, written))
     reader = StageStore(store, max_bytes=4000)
-    assert reader.get("radiance", keys[0]) is not None  # used now, by a process that has not noted it yet
+    assert reader.get(KIND, keys[0]) is not None  # used now, by a process that has not noted it yet
     assert reader.sweep() > 0
-    kept = [reader.has("radiance", key) for key in keys]
+    kept = [reader.has(KIND, key) for key in keys]
     assert kept == [True, False, False, True, True]
 
 
 def test_sweep_below_the_limit_deletes_nothing_but_old_traces(tmp_path: Path) -> None:
     store = LocalStore(tmp_path)
     stages = StageStore(store, max_bytes=LIMIT)
-    stages.put("radiance", KEY, b"x")
-    stranger = stages.address("radiance", "cd" * 32)
+    stages.put(KIND, KEY, b"x")
+    stranger = stages.address(KIND, "cd" * 32)
     for suffix in (".used", ".lease"):
         store.put(stranger + suffix, b"")
         os.utime(tmp_path / (stranger + suffix), (0, 0))
     assert stages.sweep() == 0
-    assert [info.key for info in store.list()] == [stages.address("radiance", KEY)]
+    assert [info.key for info in store.list()] == [stages.address(KIND, KEY)]
 
 
-def test_image_used_from_memory_counts_as_used(tmp_path: Path) -> None:
-    store, memory = LocalStore(tmp_path), RadianceCache()
-    options: dict[str, Any] = {"shape": (3, 4, 4), "memory": memory}
-    obtain_radiance(KEY, lambda: (small_image(), STATISTICS), stages=StageStore(store, max_bytes=LIMIT), **options)
+def test_light_used_from_memory_counts_as_used(tmp_path: Path) -> None:
+    store, memory = LocalStore(tmp_path), LightCache()
+    options: dict[str, Any] = {"shapes": SHAPES, "memory": memory}
+    obtain_light(KEY, small_light, stages=StageStore(store, max_bytes=LIMIT), **options)
     later = StageStore(store, max_bytes=LIMIT)  # as if an hour had passed: it remembers no touch
-    assert obtain_radiance(KEY, lambda: (small_image(), STATISTICS), stages=later, **options).source == "memory"
-    assert store.exists(later.address("radiance", stored_radiance_key(KEY)) + ".used")
+    assert obtain_light(KEY, small_light, stages=later, **options).source == "memory"
+    assert store.exists(later.address(KIND, stored_light_key(KEY)) + ".used")
 
 
 # Workers at once -----------------------------------------------------------------------------------------------------
 
 
-def test_threads_that_need_one_image_render_it_once(tmp_path: Path) -> None:
+def test_threads_that_need_the_same_light_render_it_once(tmp_path: Path) -> None:
     store, made = LocalStore(tmp_path), []
 
-    def render() -> tuple[RadianceImage, RenderStatistics]:
+    def render() -> RenderedLight:
         made.append(1)
-        return small_image(), STATISTICS
+        return small_light()
 
     def obtain(_: int) -> bytes:
         stages = StageStore(store, max_bytes=LIMIT)
-        found = obtain_radiance(KEY, render, shape=(3, 4, 4), memory=RadianceCache(), stages=stages)
-        return found.image.photons.tobytes()
+        found = obtain_light(KEY, render, shapes=SHAPES, memory=LightCache(), stages=stages)
+        return found.light.replicas.tobytes()
 
     with ThreadPoolExecutor(8) as pool:
-        assert set(pool.map(obtain, range(8))) == {small_image().photons.tobytes()}
+        assert set(pool.map(obtain, range(8))) == {small_light().replicas.tobytes()}
     assert len(made) == 1
 
 
@@ -395,7 +459,7 @@ print(json.dumps([manifest["run"]["cache"][0]["result"], manifest["products"]]))
 """
 
 
-def test_processes_that_need_one_image_render_it_once(recipe: dict[str, Any], tmp_path: Path) -> None:
+def test_processes_that_need_the_same_light_render_it_once(recipe: dict[str, Any], tmp_path: Path) -> None:
     commands = [[sys.executable, "-c", PRODUCE, str(tmp_path), f"f/{number}"] for number in range(3)]
     running = [subprocess.Popen(command, stdin=-1, stdout=-1, text=True) for command in commands]
     for process in running:
@@ -412,28 +476,28 @@ KILLED = """
 import os, sys
 from fullwell.pipeline import StageStore
 from fullwell.storage import LocalStore
-with StageStore(LocalStore(sys.argv[1]), max_bytes=1000).turn("radiance", sys.argv[2]) as turn:
+with StageStore(LocalStore(sys.argv[1]), max_bytes=1000).turn("light", sys.argv[2]) as turn:
     assert turn.ours
     os._exit(9)
 """
 
 
 def test_worker_that_was_killed_on_this_machine_is_succeeded_at_once(tmp_path: Path) -> None:
-    key = stored_radiance_key(KEY)
+    key = stored_light_key(KEY)
     assert subprocess.run([sys.executable, "-c", KILLED, str(tmp_path), key], check=False).returncode == 9
     stages = StageStore(LocalStore(tmp_path), max_bytes=LIMIT, lease_s=1000.0, wait_s=1000.0)
-    assert LocalStore(tmp_path).exists(stages.address("radiance", key) + ".lease")
-    found = obtain_radiance(KEY, lambda: (small_image(), STATISTICS), shape=(3, 4, 4), memory=RadianceCache(), stages=stages)
+    assert LocalStore(tmp_path).exists(stages.address(KIND, key) + ".lease")
+    found = obtain_light(KEY, small_light, shapes=SHAPES, memory=LightCache(), stages=stages)
     assert found.source == "render"
-    assert stages.has("radiance", key)
-    assert not LocalStore(tmp_path).exists(stages.address("radiance", key) + ".lease")
+    assert stages.has(KIND, key)
+    assert not LocalStore(tmp_path).exists(stages.address(KIND, key) + ".lease")
 
 
 # Who uses it ---------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("setting", "limit"), [("0", None), ("123456", 123456), (None, 8 << 30)])
-def test_worker_keeps_images_in_the_products_store_within_the_setting(
+def test_worker_keeps_light_in_the_products_store_within_the_setting(
     recipe: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, setting: str | None, limit: int | None
 ) -> None:
     import fullwell.pipeline
@@ -462,7 +526,7 @@ def test_negative_cache_size_is_refused_by_name(monkeypatch: pytest.MonkeyPatch)
         load_settings()
 
 
-def test_render_command_keeps_images_between_runs_unless_told_not_to(recipe: dict[str, Any], tmp_path: Path) -> None:
+def test_render_command_keeps_light_between_runs_unless_told_not_to(recipe: dict[str, Any], tmp_path: Path) -> None:
     file = tmp_path / "ball.json"
     file.write_text(json.dumps(recipe | {"outputs": ["raw.npz"]}))
     environment = {name: value for name, value in os.environ.items() if not name.startswith("FULLWELL_")}
