@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fullwell.render.adaptive import TILE, SamplingGoal, SamplingOutcome, sample_until, tile_errors
 
-REPLICAS = 8
+REPLICAS = 4
 LIGHT = 100.0
 ONE_VIEW = np.array([1.0])
 
@@ -76,9 +76,8 @@ def tiles_of(samples: NDArray[np.int64]) -> NDArray[np.int64]:
     return samples[::TILE, ::TILE]
 
 
-ESTIMATED_AGAIN = 1.2
-"""The error is estimated from 8 replicas of 64 pixels, to 1/sqrt(2 * 7 * 64) = 3.3 %: four times that, and the share by which a
-tile that has just passed differs from the truth."""
+ESTIMATE_ERROR = 1.2
+"""The error is estimated from 4 replicas of 64 pixels, to 1/sqrt(2 * 3 * 64) = 5.1 %: four times that."""
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -92,7 +91,7 @@ def test_every_tile_gets_the_samples_that_its_variance_asks_for_and_little_more(
     samples = tiles_of(outcome.samples)
     needed = (deviation / wanted) ** 2
     true_ratio = deviation / np.sqrt(samples)
-    assert np.all(true_ratio <= wanted * ESTIMATED_AGAIN)
+    assert np.all(true_ratio <= wanted * ESTIMATE_ERROR)
     # 5 % of safety and steps of at most half a power of two above what was there; the first round cannot be less.
     assert np.all(samples <= np.maximum(1.6 * needed, LEAST_SAMPLES))
     assert samples[1, 2] == LEAST_SAMPLES
@@ -103,8 +102,8 @@ def test_predicted_error_is_the_true_one() -> None:
     image = GaussianImage(deviation)
     outcome = run(image, SamplingGoal(noise_ratio=None, samples_per_pixel=64), EvenNoise())
     true_ratio = 3.0 / np.sqrt(64)
-    # 36 tiles of 64 pixels, 8 replicas each: 0.55 % of statistical error, five of them.
-    assert outcome.rms_ratio == pytest.approx(true_ratio, rel=0.028)
+    # 36 tiles of 64 pixels, 4 replicas each: 0.85 % of statistical error, four of them.
+    assert outcome.rms_ratio == pytest.approx(true_ratio, rel=0.034)
     assert outcome.ratio.max() < 1.2 * true_ratio
 
 
@@ -113,7 +112,7 @@ def test_number_of_rounds_stays_small() -> None:
     outcome = run(image, SamplingGoal(noise_ratio=0.5, max_samples_per_pixel=1 << 20), EvenNoise())
     assert outcome.stopped_by == "target"
     assert outcome.rounds == image.rounds
-    assert outcome.rounds <= 8  # a factor of four a round from 32 to 6400 samples, and what the estimates add
+    assert outcome.rounds <= 8  # a factor of four a round from 16 to 6400 samples, and what the estimates add
 
 
 def test_cap_is_kept_and_tiles_that_miss_the_target_are_counted() -> None:
@@ -122,7 +121,7 @@ def test_cap_is_kept_and_tiles_that_miss_the_target_are_counted() -> None:
     outcome = run(image, SamplingGoal(noise_ratio=0.5, max_samples_per_pixel=256), EvenNoise())
     assert (outcome.stopped_by, outcome.unmet_tiles, outcome.tiles) == ("samples", 2, 4)
     np.testing.assert_array_equal(tiles_of(outcome.samples), [[LEAST_SAMPLES, 256], [256, LEAST_SAMPLES]])
-    assert outcome.ratio[0, 1] == pytest.approx(100.0 / 16.0, rel=ESTIMATED_AGAIN - 1)
+    assert outcome.ratio[0, 1] == pytest.approx(100.0 / 16.0, rel=ESTIMATE_ERROR - 1)
 
 
 ONE_SAMPLE = pytest.mark.xfail(
@@ -130,7 +129,7 @@ ONE_SAMPLE = pytest.mark.xfail(
 )
 
 
-@pytest.mark.parametrize("cap", [pytest.param(4, marks=ONE_SAMPLE), pytest.param(8, marks=ONE_SAMPLE), 16, 100])
+@pytest.mark.parametrize("cap", [pytest.param(4, marks=ONE_SAMPLE), 8, 16, 100])
 def test_cap_below_the_first_round_is_kept_too(cap: int) -> None:
     outcome = run(GaussianImage(np.full((1, 2), 50.0)), SamplingGoal(noise_ratio=0.5, max_samples_per_pixel=cap), EvenNoise())
     # One sample in each replica is the least that says anything of the error.
@@ -170,7 +169,7 @@ def test_worst_channel_decides() -> None:
 
     goal = SamplingGoal(noise_ratio=0.5, max_samples_per_pixel=1 << 20)
     outcome = run(GaussianImage(np.full((2, 2), 8.0), responses=2), goal, SecondChannelIsStrict())
-    assert np.all(tiles_of(outcome.samples) >= (8.0 / 0.25) ** 2 / ESTIMATED_AGAIN**2)
+    assert np.all(tiles_of(outcome.samples) >= (8.0 / 0.25) ** 2 / ESTIMATE_ERROR**2)
 
 
 def test_weights_of_light_groups_scale_the_error() -> None:
