@@ -30,7 +30,7 @@ def light_key(frame: FrameDescription, rig: CameraRig, plan: LightPlan, *, varia
             "version": _RADIANCE_VERSION,
             "renderer": importlib.metadata.version("mitsuba"),
             "variant": variant,
-            "scene": {"objects": plan.scene.objects, "lights": plan.scene.lights},
+            "scene": {"objects": plan.scene.objects, "lights": plan.scene.lights, "fog": plan.scene.fog},
             "pose": camera.camera_to_world,
             "film": [camera.film.rows, camera.film.cols, camera.tangent_pitch],
             "pupil_m": lens.pupil_diameter_m if thin else 0.0,

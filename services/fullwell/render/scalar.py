@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fullwell.core.constants import NM_PER_M, PLANCK_J_S, SPEED_OF_LIGHT_M_PER_S
-from fullwell.core.errors import RenderError
+from fullwell.core.errors import FieldError, RenderError
 from fullwell.core.rng import seed32
 from fullwell.radiometry import WavelengthGrid
 from fullwell.render.translate import translate
@@ -27,6 +27,8 @@ class ScalarImage:
     """Sums of samples so far, all over the image: lists of pixels are not followed, every pixel gets the most samples asked."""
 
     def __init__(self, mi: Any, work: Work) -> None:
+        if work.scene.fog is not None:
+            raise FieldError("fog needs the compiled renderer; leave it out or install libLLVM.", path="atmosphere")
         self._mi, self._work = mi, work
         names = group_names(work.scene)
         self.groups: tuple[str, ...] = names if work.keep_groups else ("all",)

@@ -20,6 +20,7 @@ __all__ = [
     "DirectionalLight",
     "Disk",
     "Emission",
+    "Fog",
     "Geometry",
     "ImageEnvironment",
     "Light",
@@ -274,6 +275,30 @@ class SunSky:
     group: str = "default"
 
 
+@dataclass(frozen=True, slots=True)
+class Fog:
+    """A layer of droplets, even in itself and without end to the sides.
+
+    Attributes
+    ----------
+    extinction_per_m
+        Share of the light that is scattered or absorbed per metre [m^-1], > 0, the same at all wavelengths: droplets are larger
+        than these.
+    albedo
+        Share of that which is scattered, in [0, 1].
+    asymmetry
+        Mean cosine of the angle of scattering, in (-1, 1); Henyey and Greenstein's phase function.
+    bottom_m, top_m
+        Heights of its ends [m], world z.
+    """
+
+    extinction_per_m: float
+    albedo: float = 0.999
+    asymmetry: float = 0.85
+    bottom_m: float = -1e4
+    top_m: float = 100.0
+
+
 Light: TypeAlias = PointLight | SpotLight | DirectionalLight | ConstantEnvironment | ImageEnvironment | SunSky
 
 
@@ -285,3 +310,4 @@ class SceneDescription:
     lights: tuple[Light, ...] = ()
     semantic_classes: tuple[str, ...] = ()
     """Names in the order of their semantic ids: ``semantic_classes[i]`` has id i + 1; 0 is unlabelled."""
+    fog: Fog | None = None

@@ -24,6 +24,7 @@ from fullwell.scene.description import (
     Diffuse,
     DirectionalLight,
     Disk,
+    Fog,
     Geometry,
     ImageEnvironment,
     Light,
@@ -65,6 +66,9 @@ _FACES_AT_ONCE = 1 << 16
 
 _INDEX_RANGE = (0.1, 10.0)
 
+_STEEPEST_PHASE = 0.99
+"""Mean cosine of scattering beyond which a phase function is a delta to single precision."""
+
 _NARROWEST_CONE_DEG = 0.2
 """The cosine of a smaller angle is 1 to single precision within a few per cent of the angle."""
 
@@ -92,6 +96,16 @@ def check_scene(scene: SceneDescription) -> None:
             _part(part, to_world, _Place(f"{where.path}.parts[{number}]", f"{where.name}, part {number}{named}"), seen)
     for index, light in enumerate(scene.lights):
         _light(light, _Place(f"scene.lights[{index}]", f"light {index} ({type(light).__name__})"))
+    if scene.fog is not None:
+        _fog(scene.fog, _Place("scene.fog", "the fog"))
+
+
+def _fog(fog: Fog, where: _Place) -> None:
+    _positive(fog.extinction_per_m, where, "extinction_per_m")
+    _between(fog.albedo, 0.0, 1.0, where, "albedo")
+    _between(fog.asymmetry, -_STEEPEST_PHASE, _STEEPEST_PHASE, where, "asymmetry")
+    if not -_FARTHEST_M <= fog.bottom_m < fog.top_m <= _FARTHEST_M:
+        where.fail("top_m", f"is {fog.top_m:g}; must be above bottom_m, {fog.bottom_m:g}, and both within {_FARTHEST_M:g} m.")
 
 
 def check_camera(camera: Camera) -> None:

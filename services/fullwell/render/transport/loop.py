@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fullwell.render.rays import CameraRays
+from fullwell.render.transport.fog import FogLayer
 from fullwell.render.transport.geometry import Geometry, Tables
 from fullwell.render.transport.lights import LightSet
 from fullwell.render.transport.materials import MaterialTable
@@ -23,7 +24,7 @@ _SHADOW_SHARE = 1.0 - 5e-5
 
 _FAR = 3e38
 _CAMERA_PAIRS = 3
-_BOUNCE_PAIRS = 4
+_BOUNCE_PAIRS = 5
 _ROULETTE_START = 3
 _MOST_LIKELY = 0.95
 
@@ -77,6 +78,7 @@ class PathLoop:
         geometry: Geometry,
         materials: MaterialTable,
         lights: LightSet,
+        fog: FogLayer | None = None,
         *,
         wavelengths: int,
         channels: int,
@@ -86,7 +88,7 @@ class PathLoop:
         import drjit as dr  # noqa: PLC0415 - the renderer is loaded late
 
         self._mi, self._dr = mi, dr
-        self._geometry, self._materials, self._lights = geometry, materials, lights
+        self._geometry, self._materials, self._lights, self._fog = geometry, materials, lights, fog
         self._wavelengths, self._channels, self._groups, self._bands = wavelengths, channels, groups, bands
 
     @property
@@ -94,7 +96,8 @@ class PathLoop:
         """What the compiled code depends on."""
         parts = (self._geometry, self._materials, self._lights)
         features = tuple(tuple(sorted(part.features)) for part in parts)
-        return features, self._lights.count > 0, self._wavelengths, self._channels, self._groups, self._bands
+        switches = self._lights.count > 0, self._fog is not None, self._bands
+        return features, switches, self._wavelengths, self._channels, self._groups
 
     def trace(self, scene: Any, camera: CameraRays, tables: Tables, launch: Launch) -> PathSums:
         """Return the sums of a launch.
@@ -202,6 +205,7 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
     last_point = dr.zeros(mi.Point3f, lanes)
     last_normal = dr.zeros(mi.Vector3f, lanes)
     last_density = dr.zeros(mi.Float, lanes)
+    single = dr.full(mi.Mask, False, lanes)
     depth = dr.zeros(mi.UInt32, lanes)
     eta = dr.full(mi.Float, 1, lanes)
     sums = [[dr.zeros(mi.Float, lanes) for _ in range(self._channels)] for _ in range(self._groups)]
@@ -217,6 +221,7 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
             last_density = mi.Float(0)  # nothing but the camera ray itself could have found what it hits
             last_normal = mi.Vector3f(0)
             last_point = mi.Point3f(0)
+            single = mi.Mask(False)
             depth = mi.UInt32(0)
             eta = mi.Float(1)
         cell_list = [cells[k] for k in range(count)]
@@ -226,6 +231,14 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
         ray = mi.Ray3f(o=origin, d=direction)
         hit = self._geometry.intersect(given.tables, given.scene, ray, active)
         segments += dr.select(active, 1, 0)
+        in_fog = mi.Mask(False)
+        if self._fog is not None:
+            in_fog, free_m = self._fog.collision(origin, direction, hit.distance, numbers.pair(first_pair + 4).x)
+            in_fog &= active
+            throughput = dr.select(in_fog, throughput * self._fog.albedo, throughput)
+            hit.point = dr.select(in_fog, origin + direction * dr.select(in_fog, free_m, 0.0), hit.point)
+            hit.offset_m = dr.select(in_fog, 0.0, hit.offset_m)
+            hit.valid &= ~in_fog
 
         # Emission met by the ray, weighted against the chance that light sampling had found it
         if "tree" in self._lights.features:
@@ -240,7 +253,7 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
                     radiance, throughput * look_up(mi, given.tables["spectra"], row, cell_list) * share, group
                 )
         if not self._lights.features.isdisjoint(("environment", "sun")):
-            escaped = active & ~hit.valid
+            escaped = active & ~hit.valid & ~in_fog
             if escaped:
                 other = self._lights.escaped_density(last_normal, direction, escaped & (last_density > 0))
                 share = dr.select(last_density > 0, last_density / (last_density + other), 1.0)
@@ -248,23 +261,26 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
                     radiance = self._added(radiance, throughput * value * share, group)
 
         depth += 1
-        alive = active & hit.valid & (depth < given.tables["max_depth"])
+        alive = active & (hit.valid | in_fog) & (depth < given.tables["max_depth"])
         finished = active & ~alive
         if alive:
             frame = mi.Frame3f(hit.shading_normal)
             wi = frame.to_local(-direction)
             choice, texture_pair = numbers.pair(first_pair + 1), numbers.pair(first_pair + 3)
             surface = self._materials.at(
-                given.tables["spectra"], hit.material, hit.uv, cell_list, wavelengths_nm, texture_pair.y, alive
+                given.tables["spectra"], hit.material, hit.uv, cell_list, wavelengths_nm, texture_pair.y, alive, single
             )
             facing = dr.select(wi.z < 0, -hit.shading_normal, hit.shading_normal)
-            bound = dr.select(surface.is_glass, mi.Vector3f(0), facing)
-            lit = alive & surface.has_smooth
+            bound = dr.select(surface.is_glass | in_fog, mi.Vector3f(0), facing)
+            lit = alive & (surface.has_smooth | in_fog)
             if self._lights.count > 0:  # noqa: SIM102 - decided while compiling; the next one on the lanes
                 if lit:
                     light = self._lights.sample(hit.point, bound, choice.x, numbers.pair(first_pair), lit)
                     wo = frame.to_local(light.direction)
                     value, density = surface.evaluate(wi, wo)
+                    if self._fog is not None:
+                        phase = self._fog.phase(dr.dot(direction, light.direction))
+                        value, density = dr.select(in_fog, phase, value), dr.select(in_fog, phase, density)
                     useful = lit & (light.pdf > 0) & dr.any(value > 0)
                     start = hit.start(light.direction, mi, dr)
                     reach = dr.minimum(light.distance * _SHADOW_SHARE, _FAR)
@@ -272,13 +288,22 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
                     useful &= ~given.scene.ray_test(shadow, coherent=False, active=useful)
                     share = dr.select(light.delta, 1.0, light.pdf / (light.pdf + density))
                     arriving = light.radiance(given.tables["spectra"], cell_list) * (share / light.pdf)
+                    if self._fog is not None:
+                        arriving = arriving * self._fog.transmittance(start, light.direction, light.distance)
                     sent = dr.select(useful, throughput * value * arriving, 0.0)
                     radiance = self._added(radiance, sent, light.group)
 
             bounce = surface.sample(wi, choice.y, numbers.pair(first_pair + 2))
             onward = frame.to_world(bounce.wo)
-            throughput = throughput * bounce.weight
-            eta = eta * bounce.eta
+            weight, next_density = bounce.weight, dr.select(bounce.delta, 0.0, bounce.pdf)
+            if self._fog is not None:
+                scattered, of_phase = self._fog.scatter(direction, numbers.pair(first_pair + 2))
+                onward = dr.select(in_fog, scattered, onward)
+                weight, next_density = dr.select(in_fog, 1.0, weight), dr.select(in_fog, of_phase, next_density)
+            throughput = throughput * weight
+            if "dispersion" in self._materials.features:
+                single |= alive & ~in_fog & bounce.single_wavelength
+            eta = eta * dr.select(in_fog, 1.0, bounce.eta)
             strongest = dr.max(throughput)
             finished |= alive & ~(strongest > 0)
             # Russian roulette by what is left of the path's weight; radiance in glass is denser by the index squared
@@ -287,7 +312,7 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
             throughput = throughput * dr.rcp(dr.maximum(survival, 1e-6))
             origin = hit.start(onward, mi, dr)
             direction = onward
-            last_density = dr.select(bounce.delta, 0.0, bounce.pdf)
+            last_density = next_density
             last_normal = bound
             last_point = hit.point
 

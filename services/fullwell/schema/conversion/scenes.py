@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -14,6 +15,7 @@ from fullwell.core.errors import unknown_name_message
 from fullwell.scene import (
     ConstantEnvironment,
     Emission,
+    Fog,
     ImageEnvironment,
     Light,
     Material,
@@ -29,7 +31,7 @@ from fullwell.schema.conversion.lights import area_light_object, light_of
 from fullwell.schema.conversion.materials import material_of, model_material
 from fullwell.schema.v1.geometry import ModelGeometry
 from fullwell.schema.v1.lights import AreaLight
-from fullwell.schema.v1.recipe import ObjectDocument, PartDocument, SceneDocument
+from fullwell.schema.v1.recipe import FogDocument, ObjectDocument, PartDocument, SceneDocument
 
 if TYPE_CHECKING:
     from fullwell.assets.model import LoadedPart
@@ -74,7 +76,24 @@ def scene_of(document: SceneDocument, context: Context) -> PlacedScene:
     if not lights and not any(part.emission for item in objects for part in item.parts):
         fail("scene.lights", "is empty and no object emits: nothing would be lit. Add a light.")
     classes = document.classes or sorted({item.semantic_class for item in objects} - {""})
-    return PlacedScene(SceneDescription(tuple(objects), tuple(lights), tuple(classes)), tuple(paths), tuple(inside_ok))
+    scene = SceneDescription(tuple(objects), tuple(lights), tuple(classes), _fog(document.atmosphere))
+    return PlacedScene(scene, tuple(paths), tuple(inside_ok))
+
+
+_REMAINING = 0.05
+"""Share of light that is left over the meteorological optical range, by the definition of the WMO (No. 8, chapter 9)."""
+
+
+def _fog(document: FogDocument | None) -> Fog | None:
+    if document is None:
+        return None
+    return Fog(
+        extinction_per_m=-math.log(_REMAINING) / document.visibility_m,
+        albedo=document.albedo,
+        asymmetry=document.asymmetry,
+        bottom_m=document.bottom_m,
+        top_m=document.top_m,
+    )
 
 
 def _check_not_empty(document: SceneDocument) -> None:

@@ -10,7 +10,20 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 from fullwell.core.errors import unknown_name_message
 from fullwell.core.hashing import canonical_json
 from fullwell.schema.v1.cameras import CameraDocument
-from fullwell.schema.v1.common import Class, Document, Flag, Group, Id, NonNegative, Range, Text, TextPattern, refuse
+from fullwell.schema.v1.common import (
+    Class,
+    Document,
+    Flag,
+    Fraction,
+    Group,
+    Id,
+    NonNegative,
+    Number,
+    Range,
+    Text,
+    TextPattern,
+    refuse,
+)
 from fullwell.schema.v1.geometry import GeometryDocument, Transform
 from fullwell.schema.v1.lights import LightDocument
 from fullwell.schema.v1.materials import MaterialDocument, MaterialReference
@@ -121,6 +134,27 @@ class ObjectDocument(Document):
         return self
 
 
+class FogDocument(Document):
+    """A layer of fog, without end to the sides, from `bottom_m` to `top_m` above the world's origin.
+
+    `visibility_m` is the meteorological optical range, over which 5 % of the light remain. `albedo` is the share of the lost
+    light that is scattered, `asymmetry` the mean cosine of its angle.
+    """
+
+    kind: Literal["fog"]
+    visibility_m: Annotated[float, Range(ge=1, le=1e6)]
+    albedo: Fraction = 0.999
+    asymmetry: Annotated[float, Range(ge=-0.99, le=0.99)] = 0.85
+    bottom_m: Number = -10_000.0
+    top_m: Number = 100.0
+
+    @model_validator(mode="after")
+    def _has_height(self) -> FogDocument:
+        if not self.bottom_m < self.top_m:
+            refuse(f"is {self.top_m:g}; must be above bottom_m, {self.bottom_m:g}.", "top_m", value=self.top_m)
+        return self
+
+
 class SceneDocument(Document):
     """Materials by name, objects, lights, and the order of the semantic classes.
 
@@ -131,6 +165,7 @@ class SceneDocument(Document):
     objects: list[ObjectDocument] = Field(default_factory=list, max_length=200_000)
     lights: list[LightDocument] = Field(default_factory=list, max_length=10_000)
     light_groups: dict[Group, NonNegative] = Field(default_factory=dict)
+    atmosphere: FogDocument | None = None
     classes: list[Class] | None = None
 
     @model_validator(mode="after")
