@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import cache
+from functools import cache, lru_cache
 from typing import assert_never
 
 import numpy as np
@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from fullwell.radiometry import (
     MAX_WAVELENGTH_NM,
     MIN_WAVELENGTH_NM,
+    SkyRadiance,
     Spectrum,
     WavelengthGrid,
-    daylight,
+    clear_sky,
     reflectance_from_linear_srgb,
-    scale_to_illuminance,
 )
 from fullwell.scene import (
     Camera,
@@ -39,13 +39,11 @@ from fullwell.scene import (
 
 __all__ = ["point_of_interest_m", "scene_illuminant"]
 
-_SUNLIGHT_K = 5500.0
-_SKYLIGHT_K = 12000.0
-"""CIE daylight that stands for the direct sun and for a clear blue sky (CIE 15:2018 names D55 and phases up to 25000 K)."""
+_SKY_ROWS, _SKY_COLS = 32, 64
+"""Enough for the sky's irradiance: within 0.03 % of that of the map that is rendered."""
 
-_SUN_LUX, _EXTINCTION = 127_500.0, 0.21
-_SKY_LUX, _SKY_RISE_LUX = 800.0, 15_500.0
-"""Sun outside the atmosphere, its extinction per air mass, and horizontal sky light of a clear day (ies1984)."""
+_LOWEST_SUN_SINE = 1e-5
+"""A sun exactly on the horizon is taken to be 2 arc seconds above, as in the picture."""
 
 _NEAREST_M = 1e-3
 """A point nearer to a point light than this is taken to be this far away."""
@@ -58,8 +56,8 @@ def scene_illuminant(scene: SceneDescription, camera: Camera) -> Spectrum | None
 
     The sum over all lights of the irradiance on a card that faces each of them, without shadows and without light that other
     surfaces reflect. Area lights count with the area that the point sees; where none is turned towards it, with a quarter of
-    their area, as for rooms that are lit by way of the ceiling. Sun and sky are CIE daylight of 5500 and 12000 K in the
-    proportion of a clear day (ies1984) times their weights.
+    their area, as for rooms that are lit by way of the ceiling. Sun and sky are those of the picture: the sun on a card that
+    faces it, and the sky on horizontal ground, each times its weight.
     """
     point_m = point_of_interest_m(scene, camera)
     total = sum((_irradiance(light, point_m) for light in scene.lights), np.zeros(_grid().count))
@@ -150,11 +148,16 @@ def _picture_values(light: ImageEnvironment) -> NDArray[np.float64]:
 
 
 def _sun_and_sky(light: SunSky) -> NDArray[np.float64]:
-    height = max(light.sun_direction[2] / math.hypot(*light.sun_direction), np.finfo(float).eps)
-    sun_lux = light.sun_weight * _SUN_LUX * math.exp(-_EXTINCTION / height)
-    sky_lux = light.sky_weight * (_SKY_LUX + _SKY_RISE_LUX * math.sqrt(height))
-    sun = scale_to_illuminance(daylight(_SUNLIGHT_K), sun_lux)
-    return _band_values(sun) + _band_values(scale_to_illuminance(daylight(_SKYLIGHT_K), sky_lux))
+    x, y, z = (value / math.hypot(*light.sun_direction) for value in light.sun_direction)
+    sky = _clear_sky((x, y, max(_LOWEST_SUN_SINE, z)), float(light.turbidity), float(light.ground_albedo))
+    irradiance = light.sun_weight * sky.sun_irradiance() + light.sky_weight * sky.sky_irradiance()
+    return _band_values(Spectrum(sky.wavelength_nm, irradiance, outside="zero"))
+
+
+@lru_cache(maxsize=4)
+def _clear_sky(towards: tuple[float, float, float], turbidity: float, ground_albedo: float) -> SkyRadiance:
+    """Return the sky, remembered: the frames of one recipe share it."""
+    return clear_sky(towards, turbidity=turbidity, ground_albedo=ground_albedo, rows=_SKY_ROWS, cols=_SKY_COLS)
 
 
 def _solid_angles_sr(geometry: Geometry, to_world: NDArray[np.float64], point_m: NDArray[np.float64]) -> tuple[float, float]:

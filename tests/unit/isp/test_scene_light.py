@@ -11,7 +11,9 @@ from fullwell.isp import scene_illuminant
 from fullwell.isp.scene_light import point_of_interest_m
 from fullwell.radiometry import (
     Spectrum,
+    WavelengthGrid,
     chromaticity,
+    clear_sky,
     correlated_colour_temperature_k,
     illuminant,
     scale_to_illuminance,
@@ -141,12 +143,23 @@ def test_a_distant_lamp_and_a_spot_that_points_elsewhere_count_little() -> None:
     ("sky", "low_k", "high_k"),
     [
         (SunSky((0.0, 0.5, 0.8)), 5500, 6500),
-        (SunSky((0.0, 0.5, 0.8), sun_weight=0.0), 11000, 13000),
-        (SunSky((0.0, 0.5, 0.8), sky_weight=0.0), 5400, 5600),
+        (SunSky((0.0, 0.5, 0.8), sun_weight=0.0), 9000, 13000),
+        (SunSky((0.0, 0.5, 0.8), sky_weight=0.0), 5000, 5600),
     ],
 )
 def test_sun_and_sky_are_daylight(sky: SunSky, low_k: float, high_k: float) -> None:
     assert low_k < kelvin(scene_illuminant(scene(sky), camera())) < high_k
+
+
+def test_sun_and_sky_are_those_of_the_picture_to_the_near_infrared() -> None:
+    sun_sky = SunSky((0.0, 0.5, 0.8), turbidity=2.5, ground_albedo=0.1, sun_weight=0.5, sky_weight=2.0)
+    found = scene_illuminant(scene(sun_sky), camera())
+    assert found is not None
+    sky = clear_sky(sun_sky.sun_direction, turbidity=2.5, ground_albedo=0.1, rows=128, cols=256)
+    expected = Spectrum(sky.wavelength_nm, 0.5 * sky.sun_irradiance() + 2.0 * sky.sky_irradiance(), outside="zero")
+    bands = WavelengthGrid(425.0, 925.0, 50.0)
+    ratio = found.band_average(bands) / expected.band_average(bands)
+    assert ratio == pytest.approx(np.full(bands.count, ratio.mean()), rel=2e-3)
 
 
 def test_the_camera_looks_where_it_is_focused_and_else_at_the_objects() -> None:

@@ -227,7 +227,9 @@ def test_a_sky_model_beyond_its_table_is_refused(recipe: dict[str, Any]) -> None
     recipe["scene"]["lights"] = [{"name": "sun", "kind": "sun_sky", "sun_elevation_deg": 30, "sun_azimuth_deg": 180}]
     validate(load_recipe(recipe))
     recipe["spectral"] = {"last_nm": 1000}
-    with pytest.raises(RecipeError, match=r"spectral\.last_nm is 1000.* ends at 720 nm"):
+    validate(load_recipe(recipe))
+    recipe["spectral"] = {"first_nm": 400, "last_nm": 1000, "step_nm": 100}
+    with pytest.raises(RecipeError, match=r"spectral\.step_nm is 100.* cover 350 to 1050 nm.* to 1040 nm"):
         validate(load_recipe(recipe))
 
 

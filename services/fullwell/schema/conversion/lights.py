@@ -33,7 +33,9 @@ __all__ = ["area_light_object", "light_of", "spot_solid_angle_sr"]
 
 _INTENSITY_UNIT = "W sr^-1 nm^-1"
 _IRRADIANCE_UNIT = "W m^-2 nm^-1"
-_SKY_MODEL_ENDS_NM = 720.0
+_SKY_MODEL_NM = (350.0, 1040.0)
+"""The range of `radiometry.clear_sky`."""
+
 _BLACK = Diffuse(Spectrum.constant(0.0))
 
 
@@ -125,14 +127,13 @@ def _image(document: documents.ImageEnvironmentLight, path: str, context: Contex
 
 
 def _sun_sky(document: documents.SunSkyLight, path: str, context: Context) -> SunSky:
-    last_nm = float(context.grid.edges_nm[-1])
-    if last_nm > _SKY_MODEL_ENDS_NM:
-        longest_nm = _SKY_MODEL_ENDS_NM - context.grid.step_nm / 2
+    low_nm, high_nm = (float(context.grid.edges_nm[end]) for end in (0, -1))
+    if low_nm < _SKY_MODEL_NM[0] or high_nm > _SKY_MODEL_NM[1]:
         fail(
-            "spectral.last_nm",
-            f"is {context.grid.last_nm:g}, but {path} is a sun_sky, whose model ends at {_SKY_MODEL_ENDS_NM:g} nm; with "
-            f"step_nm = {context.grid.step_nm:g} it must be <= {longest_nm:g}. Shorten the grid, or use another light.",
-            context.grid.last_nm,
+            "spectral.step_nm",
+            f"is {context.grid.step_nm:g}, so the bands cover {low_nm:g} to {high_nm:g} nm, but {path} is a sun_sky, which is "
+            f"known from {_SKY_MODEL_NM[0]:g} to {_SKY_MODEL_NM[1]:g} nm. Make the bands narrower, or use another light.",
+            context.grid.step_nm,
         )
     elevation_deg, azimuth_deg = _sun_angles(document, path)
     elevation, azimuth = math.radians(elevation_deg), math.radians(azimuth_deg)
