@@ -13,7 +13,7 @@ from fullwell.core.constants import NM_PER_M, PLANCK_J_S, SPEED_OF_LIGHT_M_PER_S
 from fullwell.core.errors import FieldError, RenderError
 from fullwell.core.rng import seed32
 from fullwell.radiometry import WavelengthGrid
-from fullwell.render.translate import translate
+from fullwell.render.translate import check_sky_range, translate
 from fullwell.render.transport.progressive import REPLICAS, Work, check_samples
 from fullwell.scene import Camera, SceneDescription
 from fullwell.scene.groups import group_names, only_groups
@@ -29,6 +29,7 @@ class ScalarImage:
     def __init__(self, mi: Any, work: Work) -> None:
         if work.scene.fog is not None:
             raise FieldError("fog needs the compiled renderer; leave it out or install libLLVM.", path="atmosphere")
+        check_sky_range(work.scene, work.grid)
         self._mi, self._work = mi, work
         names = group_names(work.scene)
         self.groups: tuple[str, ...] = names if work.keep_groups else ("all",)

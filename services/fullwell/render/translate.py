@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fullwell.core.errors import FieldError, FullwellError, RenderError
 from fullwell.radiometry.glasses import index_of_line
+from fullwell.radiometry.grid import WavelengthGrid
 from fullwell.radiometry.spectrum import Spectrum
 from fullwell.render.conditioning import (
     check_glass_thickness,
@@ -46,7 +47,7 @@ from fullwell.scene import (
 from fullwell.scene.tessellate import is_similarity, mesh_of, transform_mesh
 from fullwell.scene.validate import check_scene, may_repeat_faces
 
-__all__ = ["TranslatedScene", "translate"]
+__all__ = ["TranslatedScene", "check_sky_range", "translate"]
 
 _TABLE_LOW_NM = 300.0
 _TABLE_HIGH_NM = 1100.0
@@ -95,6 +96,18 @@ def translate(mi: Any, scene: SceneDescription, centre_m: NDArray[np.float64]) -
     loaded = _load(mi, scene, centre_m)
     _kept.append((scene, loaded))
     return loaded
+
+
+def check_sky_range(scene: SceneDescription, grid: WavelengthGrid) -> None:
+    """Raise FieldError where the bands of a scene with a sky go on where the renderer's own sky is black."""
+    last_nm = float(grid.edges_nm[-1])
+    if last_nm > _SKY_ENDS_NM and any(isinstance(light, SunSky) for light in scene.lights):
+        raise FieldError(
+            f"the bands go to {last_nm:g} nm, but without LLVM the sky ends at {_SKY_ENDS_NM:g} nm; shorten "
+            "spectral.last_nm, or install libLLVM.",
+            path="spectral.last_nm",
+            value=last_nm,
+        )
 
 
 def _load(mi: Any, scene: SceneDescription, centre_m: NDArray[np.float64]) -> TranslatedScene:
@@ -342,6 +355,8 @@ def _mesh_shape(mi: Any, shape_id: str, mesh: Mesh, bsdf: Any, emission: dict[st
 
 # Lights --------------------------------------------------------------------------------------------------------------
 
+
+_SKY_ENDS_NM = 720.0
 
 _LOWEST_SUN_SINE = 1e-5
 """The renderer's sky is black for a sun exactly on the horizon; here it is 2 arc seconds above."""
