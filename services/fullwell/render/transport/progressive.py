@@ -15,9 +15,10 @@ from fullwell.core.errors import CancelledError, RenderError
 from fullwell.core.rng import seed32
 from fullwell.radiometry import Spectrum, WavelengthGrid
 from fullwell.render.rays import CameraRays
-from fullwell.render.transport.collect import collect_surfaces
+from fullwell.render.transport.fog import FogLayer
 from fullwell.render.transport.geometry import Geometry
 from fullwell.render.transport.lights import LightSet
+from fullwell.render.transport.loading import load_geometry
 from fullwell.render.transport.loop import SLOTS, Launch, PathLoop, PathSums
 from fullwell.render.transport.materials import MaterialTable
 from fullwell.render.transport.replay import device_arrays, replayed
@@ -99,9 +100,9 @@ class ProgressiveImage:
 
     def __init__(self, mi: Any, work: Work) -> None:
         self._mi, self._work = mi, work
-        surfaces = collect_surfaces(work.scene, work.camera.camera_to_world[:3, 3])
+        self._geometry = load_geometry(mi, work.scene, work.camera.camera_to_world[:3, 3])
+        surfaces = self._geometry.surfaces
         self.groups: tuple[str, ...] = surfaces.groups if work.keep_groups else ("all",)
-        self._geometry = Geometry(mi, surfaces)
         spectra = SpectraTable()
         self._weights = self._spectral_weights()
         importance = dict(work.group_importance)
@@ -118,11 +119,14 @@ class ProgressiveImage:
             scene_radius_m=_radius_m(self._geometry),
         )
         self._light_shape = _mean_shape(spectra, range(of_materials, spectra.count), self._weights)
+        height_m = float(work.camera.camera_to_world[2, 3])
+        fog = None if work.scene.fog is None else FogLayer(mi, work.scene.fog, height_m)
         self._loop = PathLoop(
             mi,
             self._geometry,
             self._materials,
             self._lights,
+            fog,
             wavelengths=work.wavelengths,
             channels=len(work.responses),
             groups=len(self.groups),
@@ -227,26 +231,29 @@ class ProgressiveImage:
 
         mi = self._mi
 
+        # Numbers of lanes are rounded up to a power of two with lanes that have nothing to do: a recording fits one number.
+        idle = (1 << (len(pixels) - 1).bit_length()) - len(pixels) if len(pixels) > 1 else 0
+        padded = np.concatenate([pixels, np.zeros(idle, dtype=np.int64)])
+
         def by_lane(values: NDArray[Any]) -> Any:
             return upload(mi.UInt32, np.repeat(values, REPLICAS).astype(np.uint32))
 
-        replica = np.tile(np.arange(REPLICAS, dtype=np.int64), len(pixels))
         launch = Launch(
-            pixel=by_lane(pixels),
-            seed=upload(mi.UInt32, self._seeds[np.repeat(pixels, REPLICAS), replica]),
-            first=by_lane(self.counts[pixels]),
-            count=by_lane(counts),
-            offset=upload(mi.UInt32, self._offsets[np.repeat(pixels, REPLICAS), replica]),
+            pixel=by_lane(padded),
+            seed=upload(mi.UInt32, self._seeds[padded]),
+            first=by_lane(self.counts[padded]),
+            count=by_lane(np.concatenate([counts, np.zeros(idle, dtype=np.int64)])),
+            offset=upload(mi.UInt32, self._offsets[padded]),
         )
         sums = self._traced(launch)
         dr.eval(sums.channels, sums.bands, sums.bad, sums.segments, sums.clamped)
-        shape = (len(pixels), REPLICAS)
+        busy, shape = len(pixels), (len(padded), REPLICAS)
         for group, channels in enumerate(sums.channels):
             for channel, values in enumerate(channels):
                 found = np.asarray(values.numpy(), dtype=np.float64).reshape(shape)
-                self._sums[:, group, channel, pixels] += found.T
+                self._sums[:, group, channel, pixels] += found[:busy].T
         if self._band_sums is not None and sums.bands is not None:
-            by_band = np.asarray(sums.bands.numpy()).reshape(*shape, len(self.groups), -1)
+            by_band = np.asarray(sums.bands.numpy()).reshape(*shape, len(self.groups), -1)[:busy]
             self._band_sums[pixels] += by_band.sum(axis=1, dtype=np.float64)
         self.bad_samples += int(np.sum(sums.bad.numpy()))
         self._clamped += float(np.sum(sums.clamped.numpy(), dtype=np.float64))

@@ -7,6 +7,9 @@ from typing import Any
 
 __all__ = ["device_arrays", "replayed"]
 
+_MANY_RECORDINGS = 32
+"""One for each number of lanes; more would mean that something else differs, and Dr.Jit says so."""
+
 _recordings: dict[Hashable, tuple[Any, list[Callable[..., Any]]]] = {}
 """By kind of kernel: the frozen function, and what it calls when it has to record."""
 
@@ -27,7 +30,7 @@ def replayed(kind: Hashable, function: Callable[..., Any], scene: Any, arrays: l
             del arrays  # what `function` reads by itself; named here so that the recording takes them as inputs
             return holder[0](scene, *arguments)
 
-        known = _recordings[kind] = (dr.freeze(record), holder)
+        known = _recordings[kind] = (dr.freeze(record, warn_after=_MANY_RECORDINGS), holder)
     frozen, holder = known
     holder[:] = [function]
     try:
