@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fullwell.core.hashing import digest_of
 from fullwell.isp import scene_illuminant
-from fullwell.optics import IDEAL_LENS, channels_suffice, form_channel_image, nyquist_contrast_loss, working_f_number
+from fullwell.optics import IDEAL_LENS, channels_suffice, diffraction_otf, form_channel_image, working_f_number
 from fullwell.pipeline.noise import SensorNoise
 from fullwell.pipeline.steps import PlanStep
 from fullwell.radiometry import ChannelRadiance, Spectrum, WavelengthGrid
@@ -30,7 +30,10 @@ _MOST_PARTS = 4
 """Ranges of wavelength that a channel is cut into, so that diffraction is nearly the same within each."""
 
 _CONTRAST_BOUND = 0.02
-"""Change of contrast at the Nyquist frequency that one wavelength a channel may cause, for any colour of an object."""
+"""Change of contrast up to the Nyquist frequency that one wavelength a channel may cause, for any colour of an object."""
+
+_FREQUENCIES = 65
+"""At which contrasts are compared, from zero to Nyquist; they are smooth."""
 
 _SPECTRAL_PRODUCTS = frozenset({"radiance.exr", "irradiance.exr"})
 _SLOPES_PER_NM = (-0.01, 0.01)
@@ -216,7 +219,7 @@ def _choose_form(
             if bound <= _CONTRAST_BOUND:
                 break
         if bound > _CONTRAST_BOUND:
-            reason = f"diffraction differs within a channel: contrast by up to {bound:.2g} at Nyquist"
+            reason = f"diffraction differs within a channel: contrast by up to {bound:.2g}"
         elif len(responses) > _MOST_RESPONSES:
             reason = f"the sensors have {len(responses)} different responses; up to {_MOST_RESPONSES} are counted directly"
     direct = not (reason or needs_spectra) and skip
@@ -227,7 +230,7 @@ def _choose_form(
     if direct and not asked:
         low, high = _support(frame, responses)
         why = f"{len(responses)} responses are counted directly; only {low:g}-{high:g} nm reach one"
-        steps.append(PlanStep(what, "skip", why, f"contrast at Nyquist within {bound:.2g} for strong colours"))
+        steps.append(PlanStep(what, "skip", why, f"contrast within {bound:.2g} for strong colours"))
         return responses, places, False, True
     why = reason or (f"for {', '.join(asked)}" if asked else "asked for: nothing is skipped")
     also = "; the sensors' channels are counted directly" if direct else ""
@@ -251,19 +254,20 @@ def _support(frame: FrameDescription, responses: tuple[Spectrum, ...]) -> tuple[
 
 
 def _contrast_bound(grid: WavelengthGrid, rig: CameraRig, responses: tuple[Spectrum, ...], light: Spectrum) -> float:
-    """Return by how much the contrast at Nyquist may be off because a channel is diffracted at one wavelength."""
+    """Return by how much the contrast up to Nyquist may be off because a channel is diffracted at one wavelength."""
     lens = rig.camera.lens
     if not lens.diffraction:
         return 0.0
     f_number = working_f_number(lens.f_number, lens.magnification)
+    # Not at Nyquist alone: with small pixels no wavelength passes there, and colours differ below it.
+    frequencies = np.linspace(0.0, 0.5 / rig.camera.film.pitch_m, _FREQUENCIES)
 
-    def losses(wavelengths: NDArray[np.float64]) -> NDArray[np.float64]:
-        pitch_m = rig.camera.film.pitch_m
-        each = (nyquist_contrast_loss(wavelength_nm=float(nm), f_number=f_number, pitch_m=pitch_m) for nm in wavelengths)
-        return np.array(list(each))
+    def contrasts(slope_per_nm: float) -> NDArray[np.float64]:
+        means = _mean_wavelengths(grid, responses, light, slope_per_nm)
+        return np.stack([diffraction_otf(frequencies, wavelength_nm=float(nm), f_number=f_number) for nm in means])
 
-    plain = losses(_mean_wavelengths(grid, responses, light))
-    return max(float(np.max(np.abs(losses(_mean_wavelengths(grid, responses, light, s)) - plain))) for s in _SLOPES_PER_NM)
+    plain = contrasts(0.0)
+    return max(float(np.max(np.abs(contrasts(slope) - plain))) for slope in _SLOPES_PER_NM)
 
 
 # Groups --------------------------------------------------------------------------------------------------------------

@@ -18,6 +18,7 @@ from fullwell.schema.v1.recipe import QualityDocument, RecipeDocument
 from fullwell.schema.variation import extreme_values, frame_values
 
 if TYPE_CHECKING:
+    from fullwell.scene import Film
     from fullwell.schema.conversion.context import AssetReader, Context, RecipeFiles
     from fullwell.schema.conversion.scenes import PlacedScene
     from fullwell.schema.frame import CameraRig, FrameDescription, Quality, View
@@ -81,7 +82,7 @@ class RecipeBuilder:
         self._base_dir = document.base_dir if base_dir is None else base_dir
         self._asset_reader = asset_reader
         self._files: RecipeFiles | None = None
-        self._views: tuple[tuple[View, ...], ...] | None = None
+        self._views: list[tuple[tuple[Film, View], ...]] | None = None
 
     def frame(self, index: int) -> FrameDescription:
         """Return frame `index`, resolved and checked. Raises RecipeError, or FieldError where there is no such frame."""
@@ -150,11 +151,11 @@ class RecipeBuilder:
             warnings=context.all_warnings(),
             recipe_json=canonical_json(plain).decode(),
             group_weights=tuple(sorted(recipe.scene.light_groups.items())),
-            views=self._views,
+            views=_views_on(self._views, cameras, tuple(sorted(recipe.scene.light_groups.items()))),
         )
 
-    def _shared_views(self, context: Context) -> tuple[tuple[View, ...], ...]:
-        """Return each camera's views of the same light that frames of the recipe have; () where `vary` changes none.
+    def _shared_views(self, context: Context) -> list[tuple[tuple[Film, View], ...]]:
+        """Return the views that frames of the recipe have, for each camera with the film it is on; none if `vary` changes none.
 
         All combinations where they are few; otherwise every value by itself.
         """
@@ -167,20 +168,36 @@ class RecipeBuilder:
             if _changes_only_the_view(path):
                 extremes.setdefault(path, []).append(value)
         if not extremes:
-            return ()
+            return []
         base = frame_values(self._document, 0)
         if math.prod(len(values) for values in extremes.values()) <= _MOST_VIEWS:
             changes = [dict(zip(extremes, chosen, strict=True)) for chosen in itertools.product(*extremes.values())]
         else:
             changes = [{path: value} for path, values in extremes.items() for value in values][:_MOST_VIEWS]
-        found: dict[str, tuple[View, ...]] = {}
+        found: dict[str, tuple[tuple[Film, View], ...]] = {}
         for change in changes:
             recipe = _varied_document(self._document, base | change)
             weights = tuple(sorted(recipe.scene.light_groups.items()))
             rigs = [camera_rig(c, f"cameras[{i}]", recipe.quality.oversampling, context) for i, c in enumerate(recipe.cameras)]
-            views = tuple(View(rig.sensors, weights) for rig in rigs)
-            found.setdefault(digest_of([[[s.model, s.exposure] for s in view.sensors] for view in views] + [weights]), views)
-        return tuple(zip(*found.values(), strict=True))
+            views = tuple((rig.camera.film, View(rig.sensors, weights)) for rig in rigs)
+            looks = [[film, [[s.model, s.exposure] for s in view.sensors]] for film, view in views]
+            found.setdefault(digest_of([looks, weights]), views)
+        return list(found.values())
+
+
+def _views_on(
+    found: list[tuple[tuple[Film, View], ...]], cameras: tuple[CameraRig, ...], weights: tuple[tuple[str, float], ...]
+) -> tuple[tuple[View, ...], ...]:
+    """Return for each camera those of the views that its own film serves: pixels of another pitch are rendered anew."""
+    from fullwell.schema.frame import View  # noqa: PLC0415
+
+    if not found:
+        return ()
+    fitting = (
+        tuple(view for film, view in (views[position] for views in found) if film == rig.camera.film)
+        for position, rig in enumerate(cameras)
+    )
+    return tuple(views or (View(rig.sensors, weights),) for views, rig in zip(fitting, cameras, strict=True))
 
 
 def _changes_only_the_view(path: str) -> bool:

@@ -67,7 +67,7 @@ def test_a_picture_needs_channels_and_no_bands(lamps: dict[str, Any]) -> None:
     assert len(plan.channels["phone"]) == 3
     step = step_of(plan, "spectra")
     assert step.decision == "skip"
-    assert "contrast at Nyquist within" in step.error_bound
+    assert "contrast within" in step.error_bound
     film = frame_of(lamps).cameras[0].camera.film
     replicas, bands = plan.shapes(film)
     assert replicas == (REPLICAS, 1, len(plan.request.responses), 16, 24)
@@ -192,6 +192,11 @@ def test_channels_are_cut_where_diffraction_differs_within_them(
         assert np.all((means > frame.grid.edges_nm[0]) & (means < frame.grid.edges_nm[-1]))
 
 
+def test_pixels_too_small_for_any_contrast_at_nyquist_are_cut_for_the_contrast_below_it(lamps: dict[str, Any]) -> None:
+    lamps["cameras"][0]["lens"]["f_number"] = 16.0  # cut off at half of Nyquist
+    assert min(len(places) for places in plan_of(lamps).channels["phone"]) > 1
+
+
 def test_without_diffraction_channels_stay_whole(lamps: dict[str, Any]) -> None:
     lamps["cameras"][0]["lens"]["diffraction"] = False
     assert [len(places) for places in plan_of(lamps).channels["phone"]] == [1, 1, 1]
@@ -228,6 +233,25 @@ EXPOSURES = {"grid": {"cameras[0].sensors[0].exposure.time_s": [0.001, 0.004, 0.
 def test_frames_that_vary_exposures_share_one_rendering(lamps: dict[str, Any]) -> None:
     assert len(set(keys_of(lamps | {"vary": EXPOSURES}))) == 1
     assert len(plan_of(lamps | {"vary": EXPOSURES}).request.targets) == 3
+
+
+def test_sensors_on_another_film_have_another_rendering_and_no_say_in_this_one(lamps: dict[str, Any]) -> None:
+    pitches = {"cameras[0].sensors[0].pixel_pitch_m": [1.4e-6, 2.8e-6]}
+    lamps["vary"] = {"grid": pitches | EXPOSURES["grid"]}
+    keys = keys_of(lamps)
+    assert len(set(keys[:3])) == len(set(keys[3:])) == 1
+    assert keys[0] != keys[3]
+    for index, pitch_m in ((0, 1.4e-6), (5, 2.8e-6)):
+        (views,) = frame_of(lamps, index).views
+        assert [view.sensors[0].model.pixel_pitch_m for view in views] == [pitch_m] * 3
+
+
+def test_a_film_that_no_shared_view_is_on_serves_its_own_frame(lamps: dict[str, Any]) -> None:
+    lamps["vary"] = {"random": {"frames": 3, "values": {}}, "grid": {"quality.oversampling": [1, 2]}}
+    lamps["vary"]["random"]["values"]["scene.light_groups.left"] = {"distribution": "uniform", "low": 0.5, "high": 2}
+    (views,) = frame_of(lamps, 5).views
+    assert len(views) == 1
+    assert views[0].group_weights == frame_of(lamps, 5).group_weights
 
 
 @pytest.mark.parametrize(
