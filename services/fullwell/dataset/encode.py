@@ -28,6 +28,7 @@ from fullwell.scene.images import CaptureRecord, OpticalImage, RawImage
 
 __all__ = [
     "DepthImage",
+    "decode_coverage_png",
     "decode_depth_exr",
     "decode_ids_png",
     "decode_irradiance_exr",
@@ -37,6 +38,7 @@ __all__ = [
     "decode_raw_npz",
     "decode_raw_tiff",
     "decode_rgb_png",
+    "encode_coverage_png",
     "encode_depth_exr",
     "encode_ids_png",
     "encode_irradiance_exr",
@@ -54,6 +56,7 @@ _METADATA = "fullwell"
 _STANDARD_ERROR = "relativeStandardError"
 _FIRST_ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 _MAX_ID = 2**24 - 1
+_WHITE = 255
 
 
 # Spectral images -----------------------------------------------------------------------------------------------------
@@ -265,6 +268,25 @@ def decode_ids_png(content: bytes) -> NDArray[np.uint32]:
     if values.ndim == 2:
         return values
     return values @ np.array([1, 256, 65536], dtype=np.uint32)
+
+
+def encode_coverage_png(coverage: NDArray[np.float32]) -> bytes:
+    """Return (rows, cols) shares in [0, 1] as 8-bit grey PNG, 255 for 1: exact for the default of 17 rays per edge pixel.
+
+    Raises FieldError where a share is NaN or outside [0, 1].
+    """
+    if coverage.ndim != 2:
+        raise ShapeError(f"coverage has shape {coverage.shape}; must be (rows, cols).")
+    if not np.all((coverage >= 0) & (coverage <= 1)):
+        raise FieldError("coverage holds values that are NaN or outside [0, 1]; must be shares of pixels.", path="coverage")
+    info = PngInfo()
+    info.add_text("coverage", "share = grey / 255")
+    return _png(Image.fromarray(np.rint(coverage * _WHITE).astype(np.uint8)), info)
+
+
+def decode_coverage_png(content: bytes) -> NDArray[np.float32]:
+    """Return the (rows, cols) shares of `encode_coverage_png`, to the nearest 1/255."""
+    return np.asarray(_opened_png(content).convert("L"), dtype=np.float32) / np.float32(_WHITE)
 
 
 def _opened_png(content: bytes) -> Image.Image:

@@ -37,6 +37,8 @@ def _object_document(item: ObjectLabel) -> dict[str, Any]:
         "bbox_amodal_px": None if item.bbox_amodal_px is None else _numbers(item.bbox_amodal_px),
         "visible_px": item.visible_px,
         "amodal_px": item.amodal_px,
+        "visible_area_px": round(item.visible_area_px, _DECIMALS),
+        "amodal_area_px": round(item.amodal_area_px, _DECIMALS),
         "visible_fraction": round(item.visible_fraction, _DECIMALS),
         "truncated_fraction": round(item.truncated_fraction, _DECIMALS),
         "box3d_camera": {

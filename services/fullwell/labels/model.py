@@ -31,13 +31,17 @@ class ObjectLabel:
     id, instance, semantic_class, class_id
         The recipe's id; the value in the instance map; class name and the value in the semantic map.
     bbox_visible_px
-        (x0, y0, x1, y1) that encloses the visible pixels, edges included: x1 - x0 is a width in pixels. None when hidden.
+        (x0, y0, x1, y1) that encloses the visible pixels, edges included: x1 - x0 is a width in pixels. None where no pixel
+        centre shows the object.
     bbox_amodal_px
         The same for the whole object, hidden parts and parts outside the picture included. None where it is behind the camera.
     visible_px, amodal_px
-        Pixels that show the object; pixels that would show it if nothing stood before it.
+        Pixel centres that show the object; pixel centres that would show it if nothing stood before it.
+    visible_area_px, amodal_area_px
+        Area that shows the object, and that would show it if nothing stood before it [px]: parts of pixels count as parts. An
+        object thinner than a pixel may have an area and no pixel centre.
     visible_fraction
-        visible_px / amodal_px, 0 where the object covers no pixel centre.
+        visible_area_px / amodal_area_px, 0 where the object covers nothing.
     truncated_fraction
         Share of the amodal box's area that lies outside the picture.
     """
@@ -50,6 +54,8 @@ class ObjectLabel:
     bbox_amodal_px: tuple[float, float, float, float] | None
     visible_px: int
     amodal_px: int
+    visible_area_px: float
+    amodal_area_px: float
     visible_fraction: float
     truncated_fraction: float
     box3d: Box3D
@@ -60,7 +66,8 @@ class Labels:
     """Maps (rows, cols) and objects of one picture.
 
     `instances` uint32 and `semantic` uint16 are 0 where nothing is; `depth_z_m` (along the optical axis) and
-    `depth_range_m` (along the ray) are float32 [m], +inf where nothing is; `normals_camera` (rows, cols, 3) float32.
+    `depth_range_m` (along the ray) are float32 [m], +inf where nothing is; `normals_camera` (rows, cols, 3) float32;
+    `coverage` float32 in (0, 1], the share of the pixel that shows what its centre shows, `instances` there.
     `instance_table` has (id, instance) of every object of the scene, in the picture or not.
     """
 
@@ -69,6 +76,7 @@ class Labels:
     depth_z_m: NDArray[np.float32]
     depth_range_m: NDArray[np.float32]
     normals_camera: NDArray[np.float32]
+    coverage: NDArray[np.float32]
     objects: tuple[ObjectLabel, ...]
     instance_table: tuple[tuple[str, int], ...]
     semantic_classes: tuple[str, ...]

@@ -126,6 +126,19 @@ def test_ids_beyond_24_bits_are_refused() -> None:
         encode.encode_ids_png(np.array([[2**24]], np.uint32))
 
 
+def test_coverage_in_seventeenths_comes_back_exactly() -> None:
+    coverage = (np.arange(18, dtype=np.float32) / np.float32(17)).reshape(3, 6)
+    content = encode.encode_coverage_png(coverage)
+    assert_array_equal(np.rint(encode.decode_coverage_png(content) * 17), np.arange(18).reshape(3, 6))
+    assert Image.open(io.BytesIO(content)).mode == "L"
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.1, np.nan])
+def test_coverage_that_is_no_share_is_refused(share: float) -> None:
+    with pytest.raises(FieldError, match="coverage"):
+        encode.encode_coverage_png(np.full((2, 2), share, np.float32))
+
+
 def test_an_srgb_image_comes_back_exactly() -> None:
     rgb = np.random.default_rng(5).integers(0, 255, (4, 6, 3), dtype=np.uint8)
     assert_array_equal(encode.decode_rgb_png(encode.encode_rgb_png(rgb)), rgb)
@@ -247,6 +260,7 @@ DECODERS = [
     (encode.decode_json, lambda: encode.encode_json({"a": [1, 2, 3]})),
     (encode.decode_rgb_png, lambda: encode.encode_rgb_png(np.zeros((9, 9, 3), np.uint8))),
     (encode.decode_ids_png, lambda: encode.encode_ids_png(np.ones((9, 9), np.uint32))),
+    (encode.decode_coverage_png, lambda: encode.encode_coverage_png(np.ones((9, 9), np.float32))),
     (encode.decode_raw_npz, lambda: encode.encode_raw_npz(raw())),
     (encode.decode_raw_tiff, lambda: encode.encode_raw_tiff(raw())),
 ]

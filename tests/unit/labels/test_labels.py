@@ -9,7 +9,7 @@ from fullwell.core.errors import ShapeError
 from fullwell.labels import Labels, labels_document, make_labels
 from fullwell.radiometry import Spectrum
 from fullwell.render import query_surfaces
-from fullwell.scene import Camera, Cube, Diffuse, Film, Lens, Part, SceneDescription, SceneObject, Sphere, look_at
+from fullwell.scene import Camera, Cube, Diffuse, Film, Lens, Mesh, Part, SceneDescription, SceneObject, Sphere, look_at
 
 GREY = Diffuse(Spectrum.constant(0.5))
 
@@ -121,11 +121,37 @@ def test_mirrored_and_scaled_object_keeps_a_proper_box() -> None:
     assert sorted(label.box3d.size_m) == pytest.approx([1, 2, 4])
 
 
+def test_pole_thinner_than_a_pixel_is_listed_by_its_area() -> None:
+    pixel_m = 10.0 * camera().tangent_pitch
+    pole = placed("pole", Cube((0.3 * pixel_m, 1e-4, 20 * pixel_m)))
+    labels = labels_of(pole, placed("wall", Cube((50, 0.1, 50)), y=5.0))
+    label = labels.objects[0]
+    assert (label.visible_px, label.amodal_px, label.bbox_visible_px) == (0, 0, None)
+    assert label.visible_area_px == pytest.approx(0.3 * 20, abs=20 / 17)
+    assert label.visible_fraction == pytest.approx(1.0, abs=1e-6)
+    assert labels.coverage[24, 31:33] == pytest.approx([0.85, 0.85], abs=0.05)
+
+
+def test_half_hidden_fraction_is_exact_to_parts_of_a_pixel() -> None:
+    labels = labels_of(placed("screen", Cube((4, 0.01, 8)), x=-2.0, y=-0.01), placed("card", Cube((1.37, 1e-4, 1.1))))
+    assert labels.objects[1].visible_fraction == pytest.approx(0.5, abs=0.01)
+
+
+def test_mesh_that_many_objects_share_and_vertices_that_no_face_uses() -> None:
+    corners = np.array([[-1.0, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1], [90, 90, 90]])
+    mesh = Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.uint32))
+    left, right = labels_of(placed("a", mesh, x=-1.5), placed("b", mesh, x=1.5)).objects
+    assert left.box3d.size_m == pytest.approx([2, 0, 2])
+    pitch = camera().tangent_pitch
+    assert right.bbox_amodal_px == pytest.approx((32 + 0.05 / pitch, 24 - 0.1 / pitch, 32 + 0.25 / pitch, 24 + 0.1 / pitch))
+
+
 def test_document_is_plain_data_with_the_image_size() -> None:
     view = camera()
     document = labels_document(labels_of(placed("ball", Sphere(1.0))), view.intrinsics_px, view.camera_to_world)
     assert document["image_size_px"] == [64, 48]
     assert document["objects"][0]["id"] == "ball"
+    assert document["objects"][0]["amodal_area_px"] == pytest.approx(document["objects"][0]["visible_area_px"], rel=1e-3)
     assert document["classes"] == [{"id": 1, "name": "car"}, {"id": 2, "name": "thing"}]
     assert document["intrinsics_px"][0][2] == 32
 
