@@ -269,7 +269,8 @@ class ProgressiveImage:
             sums = self._loop.trace(scene, self._camera, self._tables, Launch(*lanes))
             return sums.channels, sums.bands, sums.bad, sums.segments, sums.clamped
 
-        kind = (self._loop.kind, self._camera.kind, self._work.grid.count)
+        # The number of lanes is part of the kind: replayed with another one, the film of the bands would keep its old size.
+        kind = (self._loop.kind, self._camera.kind, self._work.grid.count, len(launch.pixel))
         lanes = (launch.pixel, launch.seed, launch.first, launch.count, launch.offset)
         return PathSums(*replayed(kind, function, self._geometry.scene, self._inputs, *lanes))
 

@@ -56,8 +56,9 @@ def camera(rows: int, cols: int) -> Camera:
 def rendered(mi: Any, objects: int, radiance: float, film: tuple[int, int]) -> np.ndarray:
     work = Work(scene(objects, radiance), camera(*film), GRID, (Spectrum.constant(1.0),), True, False, max_depth=5, seed=3)
     image = ProgressiveImage(mi, work)
-    for count in (2, 1, 4):
-        image.add(np.arange(image.pixels), np.full(image.pixels, count), lambda _: None)
+    for count, share in ((2, 1), (1, 1), (4, 3), (2, 9)):  # fewer and fewer pixels, as in adaptive sampling
+        pixels = np.arange(0, image.pixels, share)
+        image.add(pixels, np.full(len(pixels), count), lambda _: None)
     bands = image.bands()
     assert bands is not None
     return np.concatenate([image.replicas().ravel(), bands.ravel()])
