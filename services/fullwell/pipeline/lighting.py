@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from fullwell.core.hashing import digest_of
 from fullwell.isp import scene_illuminant
 from fullwell.optics import IDEAL_LENS, channels_suffice, diffraction_otf, form_channel_image, working_f_number
+from fullwell.pipeline.culling import leave_out
 from fullwell.pipeline.noise import SensorNoise
+from fullwell.pipeline.path_depth import choose_depth
 from fullwell.pipeline.steps import PlanStep
 from fullwell.radiometry import ChannelRadiance, Spectrum, WavelengthGrid
 from fullwell.render import REPLICAS, LightRequest, NoiseTarget, SamplingGoal
-from fullwell.scene import Dielectric, Film, SceneDescription
+from fullwell.scene import Film, SceneDescription
 from fullwell.scene.groups import group_names, only_groups
 from fullwell.schema.frame import CameraRig, FrameDescription, SensorRig, View
 from fullwell.sensor import exposure_time
@@ -34,6 +36,9 @@ _CONTRAST_BOUND = 0.02
 
 _FREQUENCIES = 65
 """At which contrasts are compared, from zero to Nyquist; they are smooth."""
+
+_NO_LEVELS = "all triangles are traced: coarser meshes would gain next to nothing"
+"""Measured: docs/physics/skips.md."""
 
 _SPECTRAL_PRODUCTS = frozenset({"radiance.exr", "irradiance.exr"})
 _SLOPES_PER_NM = (-0.01, 0.01)
@@ -95,6 +100,7 @@ def plan_light(frame: FrameDescription, rig: CameraRig, position: int, *, skip: 
     responses, places, bands, direct = _choose_form(frame, rig, sensors, light, skip=skip, steps=steps)
     means = _mean_wavelengths(frame.grid, responses, light)
     scene, keep_groups = _choose_groups(frame, rig, views, skip=skip, steps=steps)
+    scene, max_depth = _reduce(frame, rig, scene, keep_groups, skip=skip, steps=steps)
     quality = frame.quality
     goal = SamplingGoal(
         noise_ratio=quality.noise_ratio,
@@ -105,13 +111,12 @@ def plan_light(frame: FrameDescription, rig: CameraRig, position: int, *, skip: 
     )
     targets = _targets(frame.grid, rig, views, places)
     steps.append(_sampling_step(frame, rig, views))
-    steps.append(_depth_step(frame, rig))
     request = LightRequest(
         grid=frame.grid,
         responses=responses,
         keep_bands=bands,
         keep_groups=keep_groups,
-        max_depth=quality.max_depth,
+        max_depth=max_depth,
         goal=goal,
         targets=targets,
         group_importance=_importance(views) if keep_groups else (),
@@ -125,7 +130,7 @@ def plan_light(frame: FrameDescription, rig: CameraRig, position: int, *, skip: 
             "groups": keep_groups,
             "importance": list(request.group_importance),
             "goal": goal,
-            "depth": quality.max_depth,
+            "depth": max_depth,
             "lens": [rig.camera.lens.f_number, rig.camera.lens.magnification] if adaptive else None,
             "views": [[[[s.model, s.exposure] for s in v.sensors], list(v.group_weights)] for v in views] if adaptive else None,
         }
@@ -299,6 +304,24 @@ def _importance(views: tuple[View, ...]) -> tuple[tuple[str, float], ...]:
     return tuple(sorted((name, weight) for name, weight in strongest.items() if weight > 0))
 
 
+# Scene ---------------------------------------------------------------------------------------------------------------
+
+
+def _reduce(
+    frame: FrameDescription, rig: CameraRig, scene: SceneDescription, keep_groups: bool, *, skip: bool, steps: list[PlanStep]
+) -> tuple[SceneDescription, int]:
+    """Return the scene without objects that cannot matter, and how many segments its paths have."""
+    name = rig.camera.name
+    if skip:
+        scene, step = leave_out(scene, rig.camera, frame.grid, weighted=keep_groups)
+        steps.append(step)
+    depth, step = choose_depth(scene, frame.grid, frame.quality.max_depth, camera_name=name, skip=skip)
+    steps.append(step)
+    steps.append(PlanStep(f"{name}: level of detail", "skip", _NO_LEVELS))
+    steps.append(PlanStep(f"{name}: motion", "skip", "nothing moves"))
+    return scene, depth
+
+
 # Samples -------------------------------------------------------------------------------------------------------------
 
 
@@ -339,10 +362,3 @@ def _sampling_step(frame: FrameDescription, rig: CameraRig, views: tuple[View, .
     return PlanStep(
         what, "run", f"{size}, {cap}, until the noise allows{shared}", f"{quality.noise_ratio:g} of the sensor's noise"
     )
-
-
-def _depth_step(frame: FrameDescription, rig: CameraRig) -> PlanStep:
-    depth = frame.quality.max_depth
-    glass = any(isinstance(part.material, Dielectric) for item in frame.scene.objects for part in item.parts)
-    why = "glass in the scene" if glass else "no glass in the scene"
-    return PlanStep(f"{rig.camera.name}: paths", "run", f"up to {depth} segments ({why})", "paths that are longer")
