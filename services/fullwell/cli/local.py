@@ -30,9 +30,12 @@ CacheOption = Annotated[
     typer.Option(
         "--cache",
         metavar="DIR",
-        help="Folder whose cache/ keeps radiance images between runs; default FULLWELL_HOME where it is set, else the user's "
+        help="Folder whose cache/ keeps rendered light between runs; default FULLWELL_HOME where it is set, else the user's "
         "cache folder. FULLWELL_CACHE_BYTES bounds it; 0 turns it off.",
     ),
+]
+NoSkipOption = Annotated[
+    bool, typer.Option("--no-skip", help="Leave nothing out that the planner would, to see what that changes.")
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Report as JSON.")]
 
@@ -55,6 +58,7 @@ def render(
     force: Annotated[bool, typer.Option("--force", help="Replace frames that were made from another recipe.")] = False,
     cache: CacheOption = None,
     no_cache: Annotated[bool, typer.Option("--no-cache", help="Render everything anew and keep nothing.")] = False,
+    no_skip: NoSkipOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Make the frames of a recipe on this machine, in this process."""
@@ -76,7 +80,7 @@ def render(
             bar = bars.add_task(f"frame {index}: load", total=1.0)
             prefix = f"frames/{index}"
             if force:
-                _forget_other(store, prefix, document, index)
+                _forget_other(store, prefix, document, index, skip=not no_skip)
             manifest = run_frame(
                 document,
                 index,
@@ -84,6 +88,7 @@ def render(
                 prefix,
                 builder=builder,
                 stages=stages,
+                skip=not no_skip,
                 progress=lambda at, bar=bar, index=index: bars.update(  # type: ignore[misc]
                     bar, completed=at.fraction, description=f"frame {index}: {at.stage}"
                 ),
@@ -99,7 +104,7 @@ def render(
     reused = [entry for item in finished for entry in item["cache"] if entry["result"] == "hit"]
     if reused:
         saved_s = sum(entry["saved_wall_s"] for entry in reused)
-        print(f"note: {len(reused)} radiance image(s) came from the cache, which saved {saved_s:.3g} s of rendering")
+        print(f"note: the light of {len(reused)} view(s) came from the cache, which saved {saved_s:.3g} s of rendering")
     for warning in sorted({warning for item in finished for warning in item["warnings"]}):
         print(f"note: {warning}")
 
@@ -111,6 +116,7 @@ def _summary(folder: Path, index: int, manifest: dict[str, Any]) -> dict[str, An
         "products": [product["name"] for product in manifest["products"]],
         "warnings": manifest["warnings"],
         "seconds": manifest["run"]["seconds"],
+        "cpu_s": manifest["run"].get("cpu_s"),
         "cache": manifest["run"].get("cache", []),
     }
 
@@ -135,7 +141,7 @@ def _cache_folder() -> Path:
     return (Path(given) if given.startswith("/") else Path.home() / ".cache") / "fullwell"
 
 
-def _forget_other(store: Any, prefix: str, document: RecipeDocument, index: int) -> None:
+def _forget_other(store: Any, prefix: str, document: RecipeDocument, index: int, *, skip: bool) -> None:
     """Remove a published frame that was made from another recipe; the same frame is left alone and reused."""
     from fullwell.dataset.encode import decode_json
     from fullwell.pipeline import MANIFEST_NAME
@@ -144,7 +150,7 @@ def _forget_other(store: Any, prefix: str, document: RecipeDocument, index: int)
 
     key = f"{prefix}/{MANIFEST_NAME}"
     if store.exists(key):
-        digest = frame_digest(build_frame(document, index, base_dir=document.base_dir))
+        digest = frame_digest(build_frame(document, index, base_dir=document.base_dir), skip=skip)
         if decode_json(store.get(key)).get("frame_digest") != digest:
             store.delete(key)  # the commit point first: a crash in between leaves products that nobody reads
             store.delete_prefix(f"{prefix}/")
@@ -156,6 +162,7 @@ def plan(
     frame: int = 0,
     cache: CacheOption = None,
     no_cache: Annotated[bool, typer.Option("--no-cache", help="Do not look for what is kept already.")] = False,
+    no_skip: NoSkipOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Say what a frame would need, what is skipped and why; nothing is rendered."""
@@ -164,7 +171,7 @@ def plan(
 
     document = _load(recipe, overrides)
     described = build_frame(document, frame, base_dir=document.base_dir)
-    decided = plan_frame(described)
+    decided = plan_frame(described, skip=not no_skip)
     stages = None if no_cache else _stage_store(cache)
     if stages is not None:
         decided = with_cache_steps(decided, described, stages)
@@ -174,9 +181,9 @@ def plan(
     from rich.console import Console
     from rich.table import Table
 
-    table = Table("what", "decision", "why", "bound on the error", title=f"{document.name}, frame {frame}")
+    table = Table("what", "decision", "why", "bound on the error", "expected cost", title=f"{document.name}, frame {frame}")
     for step in decided.steps:
-        table.add_row(step.what, step.decision, step.why, step.error_bound)
+        table.add_row(step.what, step.decision, step.why, step.error_bound, step.cost)
     Console().print(table)
 
 

@@ -59,8 +59,17 @@ class NoBlur:
 class DiffractionBlur:
     """Diffraction at a clear circular pupil, in the bands where it can be seen."""
 
-    def __init__(self, planes: NDArray[Any], *, f_number: float, pitch_m: float, workers: int) -> None:
+    def __init__(
+        self,
+        planes: NDArray[Any],
+        *,
+        f_number: float,
+        pitch_m: float,
+        workers: int,
+        max_loss: float = MAX_SKIPPED_CONTRAST_LOSS,
+    ) -> None:
         """Prepare for the bands of the image whose texture is that of `planes`, (rows, cols, planes)."""
+        self._max_loss = max_loss
         self._filter = DiffractionFilter(planes, pitch_m=pitch_m, workers=workers)
         self._f_number, self._pitch_m = f_number, pitch_m
         self._bands = 0
@@ -70,7 +79,7 @@ class DiffractionBlur:
         """Return the diffracted band; the band itself where that would hardly change it."""
         self._bands += 1
         loss = nyquist_contrast_loss(wavelength_nm=wavelength_nm, f_number=self._f_number, pitch_m=self._pitch_m)
-        if loss <= MAX_SKIPPED_CONTRAST_LOSS:
+        if loss <= self._max_loss:
             self._skipped.append((loss, wavelength_nm))
             return band
         return self._filter.apply(band, wavelength_nm=wavelength_nm, f_number=self._f_number)
@@ -91,8 +100,16 @@ class PointImageBlur:
     """The point images of a lens, one for each band."""
 
     def __init__(
-        self, name: str, image_at: Callable[[float], PointImage], *, pitch_m: float, workers: int, remark: str = ""
+        self,
+        name: str,
+        image_at: Callable[[float], PointImage],
+        *,
+        pitch_m: float,
+        workers: int,
+        remark: str = "",
+        max_loss: float = MAX_SKIPPED_CONTRAST_LOSS,
     ) -> None:
+        self._max_loss = max_loss
         self._name, self._image_at, self._remark = name, image_at, remark
         self._pitch_m, self._workers = pitch_m, workers
         self._bands = 0
@@ -103,7 +120,7 @@ class PointImageBlur:
         """Return the filtered band; the band itself where that would hardly change it."""
         self._bands += 1
         spread = PointSpreadFilter(self._image_at(wavelength_nm), pitch_m=self._pitch_m)
-        if spread.contrast_loss <= MAX_SKIPPED_CONTRAST_LOSS:
+        if spread.contrast_loss <= self._max_loss:
             self._skipped.append(spread.contrast_loss)
             return band
         self._reach = max(self._reach, spread.reach)

@@ -140,9 +140,10 @@ def _choose_blur(
     """Return the filter of the bands: the most complete of the point images asked for, else diffraction."""
     f_number = working_f_number(lens.f_number, lens.magnification)
     wavelengths = radiance.grid.centres_nm
+    max_loss = options.max_skipped_contrast_loss
     wavefront = options.wavefront if "aberrations" in terms else None
     if options.psf is not None and "psf" in terms:
-        return PointImageBlur("psf", options.psf.at, pitch_m=pitch_m, workers=workers)
+        return PointImageBlur("psf", options.psf.at, pitch_m=pitch_m, workers=workers, max_loss=max_loss)
     if options.aperture is not None and "flare" in terms:
         images, remark = flare_images(
             options.aperture,
@@ -153,7 +154,7 @@ def _choose_blur(
             reach_m=max(radiance.rows, radiance.cols) * pitch_m,
             shortest_nm=float(wavelengths[0]),
         )
-        return PointImageBlur("flare", images, pitch_m=pitch_m, workers=workers, remark=remark)
+        return PointImageBlur("flare", images, pitch_m=pitch_m, workers=workers, remark=remark, max_loss=max_loss)
     if wavefront is not None:
         images, remark = wavefront_images(
             wavefront,
@@ -162,7 +163,7 @@ def _choose_blur(
             pitch_m=pitch_m,
             wavelength_nm=float(wavelengths[len(wavelengths) // 2]),
         )
-        return PointImageBlur("aberrations", images, pitch_m=pitch_m, workers=workers, remark=remark)
+        return PointImageBlur("aberrations", images, pitch_m=pitch_m, workers=workers, remark=remark, max_loss=max_loss)
     if "diffraction" not in terms:
         return NoBlur("diffraction: left out on request.")
     if not lens.diffraction:
@@ -170,7 +171,7 @@ def _choose_blur(
     # Bands of different colours, so that an edge between colours of equal brightness counts as one.
     bands = {(2 * part + 1) * radiance.grid.count // (2 * _TEXTURE_BANDS) for part in range(_TEXTURE_BANDS)}
     planes = radiance.photons[:, :, sorted(bands)]
-    return DiffractionBlur(planes, f_number=f_number, pitch_m=pitch_m, workers=workers)
+    return DiffractionBlur(planes, f_number=f_number, pitch_m=pitch_m, workers=workers, max_loss=max_loss)
 
 
 def _form_image(

@@ -8,6 +8,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from fullwell.core.errors import FieldError
+from fullwell.optics.blur import MAX_SKIPPED_CONTRAST_LOSS
 from fullwell.optics.flare import Aperture
 from fullwell.optics.psf import PointSpread
 from fullwell.optics.wavefront import Wavefront
@@ -31,12 +32,15 @@ class OpticsOptions:
     depth_z_m
         (rows, cols) depth along the axis of each sample of the radiance [m], for defocus of a picture rendered through a
         pinhole.
+    max_skipped_contrast_loss
+        Bands whose filter takes no more than this from the contrast at Nyquist are left as they are; 0 filters all.
     """
 
     wavefront: Wavefront | None = None
     aperture: Aperture | None = None
     psf: PointSpread | None = None
     depth_z_m: NDArray[Any] | None = None
+    max_skipped_contrast_loss: float = MAX_SKIPPED_CONTRAST_LOSS
 
     def __post_init__(self) -> None:
         if self.psf is not None and (self.wavefront is not None or self.aperture is not None):

@@ -42,7 +42,13 @@ def light_key(frame: FrameDescription, rig: CameraRig, plan: LightPlan, *, varia
     )
 
 
-def frame_digest(frame: FrameDescription) -> str:
-    """Return the digest of what a frame was asked to be: recipe, index and the versions that decide its bytes."""
+def frame_digest(frame: FrameDescription, *, skip: bool = True) -> str:
+    """Return the digest of what a frame was asked to be: recipe, index and the versions that decide its bytes.
+
+    A frame of which nothing was left out (`skip` false) is another one.
+    """
     versions = {name: importlib.metadata.version(name) for name in ("fullwell", "mitsuba", "numpy")}
-    return digest_of({"key_schema": KEY_SCHEMA, "recipe": frame.recipe_json, "index": frame.index, "versions": versions})
+    return digest_of(
+        {"key_schema": KEY_SCHEMA, "recipe": frame.recipe_json, "index": frame.index, "versions": versions}
+        | ({} if skip else {"skip": False})
+    )

@@ -37,6 +37,12 @@ _CONTRAST_BOUND = 0.02
 _FREQUENCIES = 65
 """At which contrasts are compared, from zero to Nyquist; they are smooth."""
 
+_PATHS_PER_CPU_S = 1.5e6
+"""In a Cornell box; many triangles and long paths take longer: a plan's cost is an order of magnitude."""
+
+_LEAST_SAMPLES = 4 * REPLICAS
+"""Rays for each film sample before the noise is looked at."""
+
 _NO_LEVELS = "all triangles are traced: coarser meshes would gain next to nothing"
 """Measured: docs/physics/skips.md."""
 
@@ -354,11 +360,20 @@ def _sampling_step(frame: FrameDescription, rig: CameraRig, views: tuple[View, .
     size = f"{film.cols} x {film.rows} samples"
     what = f"{rig.camera.name}: render"
     if quality.noise_ratio is None:
-        return PlanStep(what, "run", f"{size}, {quality.samples_per_pixel} rays each", "Monte-Carlo error, in the manifest")
+        count = quality.samples_per_pixel or 1
+        cost = f"about {_cpu_s(rig, count)} CPU-s"
+        return PlanStep(what, "run", f"{size}, {count} rays each", "Monte-Carlo error, in the manifest", cost)
     shared = f" in each of {len(views)} views" if len(views) > 1 else ""
     cap = f"at most {quality.max_samples_per_pixel} rays each"
     if quality.time_limit_s is not None:
         cap += f" and {quality.time_limit_s:g} s"
-    return PlanStep(
-        what, "run", f"{size}, {cap}, until the noise allows{shared}", f"{quality.noise_ratio:g} of the sensor's noise"
-    )
+    most = quality.max_samples_per_pixel
+    cost = f"about {_cpu_s(rig, min(_LEAST_SAMPLES, most))} to {_cpu_s(rig, most)} CPU-s"
+    bound = f"{quality.noise_ratio:g} of the sensor's noise, unless a cap is reached"
+    return PlanStep(what, "run", f"{size}, {cap}, until the noise allows{shared}", bound, cost)
+
+
+def _cpu_s(rig: CameraRig, samples_per_pixel: int) -> str:
+    """Return the CPU time that so many rays need, roughly, in two digits."""
+    seconds = rig.camera.film.rows * rig.camera.film.cols * samples_per_pixel / _PATHS_PER_CPU_S
+    return f"{float(f'{seconds:.1e}'):g}"

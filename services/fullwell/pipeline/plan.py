@@ -16,7 +16,7 @@ _DISPLAY = frozenset({"image.png"})
 _SENSOR = _DISPLAY | {"raw.npz", "raw.tiff", "raw.dng"}
 _OPTICAL = _SENSOR | {"irradiance.exr"}
 _RADIANCE = _OPTICAL | {"radiance.exr"}
-_LABELS = frozenset({"depth.exr", "normals.exr", "instances.png", "semantic.png", "labels.json"})
+_LABELS = frozenset({"depth.exr", "normals.exr", "instances.png", "semantic.png", "coverage.png", "labels.json"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +31,8 @@ class FramePlan:
     labels: bool
     lights: tuple[LightPlan, ...] = ()
     """What is rendered for each camera; empty where nothing is."""
+    skips: bool = True
+    """Whether the optics may leave out what they can bound."""
 
 
 def plan_frame(frame: FrameDescription, *, skip: bool = True) -> FramePlan:
@@ -44,7 +46,7 @@ def plan_frame(frame: FrameDescription, *, skip: bool = True) -> FramePlan:
         "labels": _LABELS,
     }
     switches = {name: bool(wanted & products) for name, products in stages.items()}
-    steps: list[PlanStep] = []
+    steps = [] if skip else [PlanStep("skips", "run", "asked for: nothing is left out that an output depends on")]
     for name, products in stages.items():
         needed = sorted(wanted & products)
         if needed:
@@ -56,11 +58,11 @@ def plan_frame(frame: FrameDescription, *, skip: bool = True) -> FramePlan:
         if switches["radiance"]:
             lights.append(plan_light(frame, rig, position, skip=skip))
             steps.extend(lights[-1].steps)
-        steps.extend(_camera_steps(frame, rig, switches["radiance"], switches["optics"]))
-    return FramePlan(steps=tuple(steps), lights=tuple(lights), **switches)
+        steps.extend(_camera_steps(frame, rig, switches["radiance"], switches["optics"], skip=skip))
+    return FramePlan(steps=tuple(steps), lights=tuple(lights), skips=skip, **switches)
 
 
-def _camera_steps(frame: FrameDescription, rig: CameraRig, radiance: bool, optics: bool) -> list[PlanStep]:
+def _camera_steps(frame: FrameDescription, rig: CameraRig, radiance: bool, optics: bool, *, skip: bool) -> list[PlanStep]:
     camera = rig.camera
     steps = []
     if radiance:
@@ -77,11 +79,11 @@ def _camera_steps(frame: FrameDescription, rig: CameraRig, radiance: bool, optic
         )
     elif optics:
         steps.extend(_blur_steps(rig))
-        steps.append(_diffraction_step(frame, rig))
+        steps.append(_diffraction_step(frame, rig, MAX_SKIPPED_CONTRAST_LOSS if skip else 0.0))
     return steps
 
 
-def _diffraction_step(frame: FrameDescription, rig: CameraRig) -> PlanStep:
+def _diffraction_step(frame: FrameDescription, rig: CameraRig, max_loss: float) -> PlanStep:
     """Say in which bands diffraction takes part; it is left out where the film is too coarse to show it."""
     what, lens = f"{rig.camera.name}: diffraction", rig.camera.lens
     if not lens.diffraction:
@@ -93,7 +95,7 @@ def _diffraction_step(frame: FrameDescription, rig: CameraRig) -> PlanStep:
         nyquist_contrast_loss(wavelength_nm=float(nm), f_number=f_number, pitch_m=rig.camera.film.pitch_m)
         for nm in frame.grid.centres_nm
     ]
-    skipped = [loss for loss in losses if loss <= MAX_SKIPPED_CONTRAST_LOSS]
+    skipped = [loss for loss in losses if loss <= max_loss]
     bound = f"contrast at Nyquist too high by at most {max(skipped):.2g}" if skipped else "none"
     if len(skipped) == len(losses):
         return PlanStep(what, "skip", "the samples are too coarse to show it", bound)
@@ -118,4 +120,6 @@ def _blur_steps(rig: CameraRig) -> list[PlanStep]:
 
 def plan_document(plan: FramePlan) -> list[dict[str, Any]]:
     """Return the plan's decisions as plain data for manifests."""
-    return [{"what": s.what, "decision": s.decision, "why": s.why, "error_bound": s.error_bound} for s in plan.steps]
+    return [
+        {"what": s.what, "decision": s.decision, "why": s.why, "error_bound": s.error_bound, "cost": s.cost} for s in plan.steps
+    ]

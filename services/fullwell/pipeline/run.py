@@ -27,18 +27,20 @@ def run_frame(
     base_dir: Path | None = None,
     builder: RecipeBuilder | None = None,
     stages: StageStore | None = None,
+    skip: bool = True,
     progress: ProgressCallback | None = None,
     should_cancel: CancelCheck | None = None,
 ) -> dict[str, Any]:
     """Build frame `index` of the recipe, make it, publish it under `prefix` and return its manifest.
 
     `base_dir` is the folder that the recipe's file names are relative to; `builder`, made once for the same document, spares
-    successive frames from reading its models again; `stages` keeps radiance images for later runs and other workers. Errors
-    and idempotence are those of `render_frame`; a frame number that the recipe does not have is a FieldError.
+    successive frames from reading its models again; `stages` keeps rendered light for later runs and other workers; without
+    `skip` the planner leaves nothing out. Errors and idempotence are those of `render_frame`; a frame number that the recipe
+    does not have is a FieldError.
     """
     if progress is not None:
         progress(FrameProgress("load", 0.0))
     frame = (builder or RecipeBuilder(document, base_dir=base_dir)).frame(index)
     return render_frame(
-        frame, store, prefix, cache=_process_cache, stages=stages, progress=progress, should_cancel=should_cancel
+        frame, store, prefix, cache=_process_cache, stages=stages, skip=skip, progress=progress, should_cancel=should_cancel
     )

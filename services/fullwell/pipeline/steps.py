@@ -10,9 +10,20 @@ __all__ = ["PlanStep"]
 
 @dataclass(frozen=True, slots=True)
 class PlanStep:
-    """One decision: what it is about, run or skip, the reason, and the bound on the error that a skip may cause."""
+    """One decision.
+
+    Attributes
+    ----------
+    what, decision, why
+        What it is about, run or skip, and the reason.
+    error_bound
+        On the error that a skip may cause.
+    cost
+        What it is expected to take, roughly; empty where that is little or not known.
+    """
 
     what: str
     decision: Literal["run", "skip"]
     why: str
     error_bound: str = "none"
+    cost: str = ""
