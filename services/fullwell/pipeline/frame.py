@@ -28,7 +28,7 @@ from fullwell.pipeline.noise import SensorNoise
 from fullwell.pipeline.plan import FramePlan, plan_document, plan_frame
 from fullwell.pipeline.progress import CancelCheck, FrameProgress, ProgressCallback
 from fullwell.pipeline.stage_store import StageStore
-from fullwell.render import RenderedLight, choose_variant, query_surfaces, render_light, tile_errors
+from fullwell.render import RenderedLight, choose_variant, query_depth, query_surfaces, render_light, tile_errors
 from fullwell.scene import Camera, Film
 from fullwell.scene.images import OpticalImage, RawImage
 from fullwell.schema.frame import CameraRig, FrameDescription, SensorRig
@@ -74,7 +74,7 @@ def render_frame(
     FullwellError
         Any stage failed; no manifest was written.
     """
-    digest = frame_digest(frame)
+    digest = frame_digest(frame, skip=skip)
     published = _published(store, prefix, digest)
     if published is not None:
         return published
@@ -141,6 +141,7 @@ class _Run:
     notes: list[str] = field(default_factory=list)
     instance_table: tuple[tuple[str, int], ...] = ()
     started: float = field(default_factory=time.time)
+    cpu_started: float = field(default_factory=time.process_time)
 
     def report(self, stage: str, fraction: float) -> None:
         """Tell where the frame is; stop where it was cancelled."""
@@ -239,10 +240,10 @@ def _rendered(run: _Run, rig: CameraRig, plan: LightPlan, folder: str, span: tup
 
 def _optics_options(run: _Run, rig: CameraRig) -> OpticsOptions:
     """Return the options of the lens, with the depth of every film sample where depth of field is made from layers."""
+    options = rig.optics if run.plan.skips else replace(rig.optics, max_skipped_contrast_loss=0.0)
     if not rig.depth_layers:
-        return rig.optics
-    hits = query_surfaces(run.frame.scene, rig.camera, should_cancel=run.should_cancel)
-    return replace(rig.optics, depth_z_m=make_labels(run.frame.scene, rig.camera, hits).depth_z_m)
+        return options
+    return replace(options, depth_z_m=query_depth(run.frame.scene, rig.camera, should_cancel=run.should_cancel))
 
 
 def _add(run: _Run, name: str, encoder: Any) -> None:
@@ -432,6 +433,7 @@ def _lens_document(camera: Camera) -> dict[str, Any]:
 
 def _label_products(run: _Run, labels: Labels, view: Camera, folder: str) -> None:
     _add(run, f"{folder}depth.exr", lambda: encode.encode_depth_exr(labels.depth_z_m, labels.depth_range_m))
+    _add(run, f"{folder}coverage.png", lambda: encode.encode_coverage_png(labels.coverage))
     _add(run, f"{folder}normals.exr", lambda: encode.encode_normals_exr(labels.normals_camera))
     _add(run, f"{folder}instances.png", lambda: encode.encode_ids_png(labels.instances))
     _add(run, f"{folder}semantic.png", lambda: encode.encode_ids_png(labels.semantic.astype(np.uint32)))
@@ -467,6 +469,7 @@ def _manifest(run: _Run, digest: str, products: list[dict[str, Any]]) -> dict[st
         "run": {
             "started_unix_s": round(run.started, 3),
             "seconds": round(time.time() - run.started, 3),
+            "cpu_s": round(time.process_time() - run.cpu_started, 3),
             "stages": run.stages,
             "cache": run.cached,
             "notes": run.notes,

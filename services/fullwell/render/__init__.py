@@ -3,7 +3,7 @@
 from fullwell.render.adaptive import NoiseTarget, SamplingGoal, tile_errors
 from fullwell.render.light import LightRequest, RenderedLight, RenderStatistics, render_light
 from fullwell.render.radiance import render_radiance
-from fullwell.render.surfaces import query_surfaces
+from fullwell.render.surfaces import query_depth, query_surfaces
 from fullwell.render.transport.progressive import REPLICAS
 from fullwell.render.variant import VariantChoice, activate, choose_variant
 
@@ -17,6 +17,7 @@ __all__ = [
     "VariantChoice",
     "activate",
     "choose_variant",
+    "query_depth",
     "query_surfaces",
     "render_light",
     "render_radiance",

@@ -24,6 +24,7 @@ PRODUCTS: tuple[str, ...] = (
     "normals.exr",
     "instances.png",
     "semantic.png",
+    "coverage.png",
     "labels.json",
 )
 """Products that `outputs` may ask for; manifest.json is always written, last."""

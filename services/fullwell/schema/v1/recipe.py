@@ -52,6 +52,7 @@ _PRODUCTS = (
     "normals.exr",
     "instances.png",
     "semantic.png",
+    "coverage.png",
     "labels.json",
 )
 """The same as ``fullwell.schema.frame.PRODUCTS`` (tested); not imported from there, so that documents load without arrays."""
