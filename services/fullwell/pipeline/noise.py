@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +56,11 @@ class SensorNoise:
         self._find_time = exposure_time_s
         self.times_s: dict[int, float] = {}
         """Base exposure times by the sensor's place, found from the first light that was shown."""
+
+    @property
+    def key(self) -> Hashable:
+        """What `channels` depends on."""
+        return tuple(parts for _, parts in self._sensors)
 
     def channels(self, light: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return (..., channels of all sensors, rows, cols) sums of responses, from (..., responses, rows, cols) of light."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -27,6 +27,11 @@ _SAFETY = 1.05
 
 class NoiseTarget(Protocol):
     """What error of the light the sensors would not notice."""
+
+    @property
+    def key(self) -> Hashable:
+        """What `channels` depends on: equal keys, equal channels of the same light."""
+        ...
 
     def channels(self, light: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return (..., channels, rows, cols): what the sensors' channels count of (..., responses, rows, cols) of light."""
@@ -137,22 +142,29 @@ def tile_errors(replicas: NDArray[np.floating], views: Views) -> TileErrors:
         (replicas, groups, responses, rows, cols): independent estimates of the light.
     """
     worst: NDArray[np.float64] | None = None
+    seen: dict[Hashable, tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
     for weights, target in views:
-        square = _tile_squares(np.tensordot(replicas.astype(np.float64), weights, axes=(1, 0)), target)
+        key = (weights.tobytes(), target.key)
+        if key not in seen:  # views that differ in exposure only look at the same means and errors
+            seen[key] = _means_and_errors(target.channels(np.tensordot(replicas.astype(np.float64), weights, axes=(1, 0))))
+        square = _tile_squares(*seen[key], target)
         worst = square if worst is None else np.maximum(worst, square)
     if worst is None:
         raise ValueError("there is no view to judge the error by")
     return TileErrors(np.sqrt(worst), float(np.sqrt(worst.mean())))
 
 
-def _tile_squares(light: NDArray[np.float64], target: NoiseTarget) -> NDArray[np.float64]:
-    """Return (tile rows, tile cols) variance of the error over that of the noise, of the worst channel."""
-    light = target.channels(light)
+def _means_and_errors(light: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return (channels, rows, cols) means of (replicas, ...) of light, and their variances summed over tiles."""
     count = len(light)
     mean = light.mean(axis=0)
-    variance = ((light - mean) ** 2).sum(axis=0) / (count * (count - 1))
+    return mean, _tile_sums(((light - mean) ** 2).sum(axis=0) / (count * (count - 1)))
+
+
+def _tile_squares(mean: NDArray[np.float64], error: NDArray[np.float64], target: NoiseTarget) -> NDArray[np.float64]:
+    """Return (tile rows, tile cols) variance of the error over that of the noise, of the worst channel."""
     # Averages over a tile of the error and of the noise, not of their ratio: one pixel that happens to be dark is no outlier.
-    error, noise = _tile_sums(variance), _tile_sums(target(mean))
+    noise = _tile_sums(target(mean))
     square = np.divide(error, noise, out=np.zeros_like(error), where=noise > 0)
     square[(noise <= 0) & (error > 0)] = np.inf
     return np.asarray(square.max(axis=0))
@@ -208,7 +220,7 @@ def _more_samples(ratio: NDArray[np.float64], so_far: NDArray[np.int64], wanted:
     """Return (tile rows, tile cols) further samples of each replica; the error falls as one over the root of their number."""
     needed = so_far * np.minimum(_SAFETY * (ratio / wanted) ** 2, _GROWTH)
     # Stratification is best when the number is a multiple of a power of two near it.
-    step = np.maximum(1, 2 ** np.floor(np.log2(np.maximum(so_far, 1) / 2)).astype(np.int64))
+    step = 2 ** np.floor(np.log2(np.maximum(so_far, 2) / 2)).astype(np.int64)
     more = np.ceil(np.maximum(needed - so_far, 0) / step).astype(np.int64) * step
     more = np.where(ratio > wanted, np.maximum(more, step), 0)
     return np.minimum(more, np.maximum(cap - so_far, 0))
