@@ -19,12 +19,22 @@ __all__ = ["Budget", "Engine", "Paired", "Result", "Stopwatch", "paired"]
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """What an engine may do: camera rays per pixel, path length and seed."""
+    """What an engine may do: camera rays per pixel, path length and seed.
+
+    With a `noise_ratio`, an engine that can takes samples until its error is that share of the sensor's noise, at most
+    `samples_per_pixel` of them; the others know only numbers of samples.
+    """
 
     samples_per_pixel: int
     max_depth: int | None = None
     """None takes the recipe's."""
     seed: int = 1
+    noise_ratio: float | None = None
+
+    @property
+    def label(self) -> str:
+        """For tables and keys: "64 spp" or "noise ratio 0.5"."""
+        return f"{self.samples_per_pixel} spp" if self.noise_ratio is None else f"noise ratio {self.noise_ratio:g}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,6 +54,12 @@ class Result:
         Camera rays per pixel that were traced, on average.
     setup_cpu_s
         CPU-seconds of loading the scene, and of the first kernels, where the engine knows them apart.
+    channels
+        (sensor channels, rows, cols) [e- s^-1 m^-2 sr^-1] where the engine counts them directly, beside or instead of bands.
+    replicas
+        (replicas, sensor channels, rows, cols): independent estimates of the same, where there are.
+    unmet_tiles
+        Tiles that stayed above the noise ratio that was asked for.
     """
 
     kind: str
@@ -52,6 +68,9 @@ class Result:
     wall_s: float
     samples: float
     setup_cpu_s: float = 0.0
+    channels: NDArray[np.float64] | None = None
+    replicas: NDArray[np.float64] | None = None
+    unmet_tiles: int = 0
 
 
 class Engine(Protocol):
