@@ -41,7 +41,7 @@ from fullwell.scene import (
     look_at,
 )
 
-__all__ = ["SCENES", "Comparison"]
+__all__ = ["SCENES", "Comparison", "box", "ceiling_lamp"]
 
 ROWS, COLS = 48, 64
 GRID = WavelengthGrid(420.0, 690.0, 30.0)

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 from agreement import Agreement, compare, mitsuba_image, our_channels, our_image
-from agreement_scenes import SCENES
+from agreement_scenes import SCENES, box, ceiling_lamp
 from numpy.typing import NDArray
 
 from fullwell.radiometry import Spectrum
 from fullwell.render import choose_variant
 from fullwell.render.light import LightRequest, render_light
 from fullwell.render.transport import progressive
+from fullwell.scene import SceneDescription
 
 pytestmark = pytest.mark.skipif(
     choose_variant().variant != "llvm_ad_spectral", reason="without LLVM it is Mitsuba's integrator that renders"
@@ -102,3 +103,22 @@ def test_same_bytes_for_one_thread_and_for_four() -> None:
         dr.set_thread_count(before)
     for one, other in zip(*images, strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def test_scenes_of_one_kind_share_recordings_but_nothing_else() -> None:
+    """Dr.Jit makes two recordings of whatever it sees first."""
+    full = replace(SCENES["diffuse_box"](), samples=8)
+    bare = replace(full, scene=SceneDescription((*box()[1:4], ceiling_lamp(0.3))))
+    first = [our_image(comparison, 0) for comparison in (full, bare, full, bare)]
+    before = recordings()
+    again = [our_image(comparison, 0) for comparison in (bare, full)]
+    assert recordings() == before
+    assert not np.array_equal(first[0], first[1])
+    for one, other in zip((*first[2:], *again), (*first[:2], first[1], first[0]), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def recordings() -> int:
+    from fullwell.render.transport import replay
+
+    return sum(frozen.n_recordings for frozen, _ in replay._recordings.values())

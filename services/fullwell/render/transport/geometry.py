@@ -92,8 +92,8 @@ class Geometry:
         mi, surfaces = self._mi, self.surfaces
         mesh = mi.Mesh("mesh", len(surfaces.vertices_m), len(surfaces.faces), mi.Properties(), False, False)
         parameters = mi.traverse(mesh)
-        parameters["vertex_positions"] = np.ascontiguousarray(surfaces.vertices_m).ravel()
-        parameters["faces"] = np.ascontiguousarray(surfaces.faces).ravel()
+        parameters["vertex_positions"] = upload(mi.Float, surfaces.vertices_m)
+        parameters["faces"] = upload(mi.UInt32, surfaces.faces)
         parameters.update()
         self.tables["vertices"] = mi.Float(parameters["vertex_positions"])
         self.tables["faces"] = mi.UInt32(parameters["faces"])

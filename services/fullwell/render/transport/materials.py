@@ -13,6 +13,7 @@ from typing import Any
 from fullwell.render.transport.records import DISPERSIVE, TEXTURED, MaterialRecords
 from fullwell.render.transport.scattering import BsdfSample, Gathered, Surface
 from fullwell.render.transport.textures import sigmoid, texel_of
+from fullwell.render.transport.upload import upload
 from fullwell.render.transport.wavelengths import SpectraTable, look_up
 from fullwell.scene import Material
 
@@ -38,8 +39,8 @@ class MaterialTable:
         """
         records = MaterialRecords(spectra, materials, compensate=compensate)
         self._mi, self.features = mi, records.features
-        self._numbers, self._rows = mi.Float(records.numbers()), mi.UInt32(records.rows())
-        self._albedo = mi.Float(records.albedos())
+        self._numbers, self._rows = upload(mi.Float, records.numbers()), upload(mi.UInt32, records.rows())
+        self._albedo = upload(mi.Float, records.albedos())
         if "texture" in self.features:
             self._texels, self._palette = records.atlas.finish(mi)
 

@@ -10,7 +10,18 @@ __all__ = ["device_arrays", "replayed"]
 _MANY_RECORDINGS = 32
 """One for each number of lanes; more would mean that something else differs, and Dr.Jit says so."""
 
-_recordings: dict[Hashable, tuple[Any, list[Callable[..., Any]]]] = {}
+
+class _Recorded:
+    """What a frozen function calls when it has to record.
+
+    Not a list: Dr.Jit looks into lists that a function refers to, and would record anew for each other content.
+    """
+
+    def __init__(self) -> None:
+        self.function: Callable[..., Any] | None = None
+
+
+_recordings: dict[Hashable, tuple[Any, _Recorded]] = {}
 """By kind of kernel: the frozen function, and what it calls when it has to record."""
 
 
@@ -24,19 +35,20 @@ def replayed(kind: Hashable, function: Callable[..., Any], scene: Any, arrays: l
 
     known = _recordings.get(kind)
     if known is None:
-        holder: list[Callable[..., Any]] = []
+        recorded = _Recorded()
 
         def record(scene: Any, arrays: list[Any], *arguments: Any) -> Any:
             del arrays  # what `function` reads by itself; named here so that the recording takes them as inputs
-            return holder[0](scene, *arguments)
+            assert recorded.function is not None
+            return recorded.function(scene, *arguments)
 
-        known = _recordings[kind] = (dr.freeze(record, warn_after=_MANY_RECORDINGS), holder)
-    frozen, holder = known
-    holder[:] = [function]
+        known = _recordings[kind] = (dr.freeze(record, warn_after=_MANY_RECORDINGS), recorded)
+    frozen, of_kind = known
+    of_kind.function = function
     try:
         return frozen(scene, arrays, *arguments)
     finally:
-        holder.clear()
+        of_kind.function = None
 
 
 def device_arrays(*objects: Any) -> list[Any]:

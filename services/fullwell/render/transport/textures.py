@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from fullwell.core.errors import RenderError
 from fullwell.radiometry.upsample import srgb_to_linear
+from fullwell.render.transport.upload import upload
 from fullwell.scene import Texture
 
 __all__ = ["Placed", "TextureAtlas", "coefficients_of_srgb", "sigmoid", "texel_of"]
@@ -66,7 +67,7 @@ class TextureAtlas:
         number = np.zeros(1 << 24, dtype=np.uint32)
         number[colours] = np.arange(colours.size, dtype=np.uint32)
         encoded = np.stack([colours >> 16, colours >> 8 & 255, colours & 255], axis=1).astype(np.uint8)
-        return mi.UInt32(number[packed]), mi.Float(coefficients_of_srgb(encoded).ravel())
+        return upload(mi.UInt32, number[packed]), upload(mi.Float, coefficients_of_srgb(encoded))
 
 
 def coefficients_of_srgb(encoded: NDArray[np.uint8]) -> NDArray[np.float32]:

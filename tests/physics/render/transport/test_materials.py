@@ -51,12 +51,14 @@ class Bench:
     def surface(
         self, material: NDArray[Any] | int, *, first_cell: int = 300, cells: list[int] | None = None, single: bool = False
     ) -> Any:
+        from fullwell.render.transport.upload import upload
+
         mi = self.mi
         numbers = cells or [(first_cell + 100 * i) % (100 * WAVELENGTHS) + 200 for i in range(WAVELENGTHS)]
         cells = [mi.UInt32(number) for number in numbers]
         return self.table.at(
             self._spectra,
-            mi.UInt32(np.atleast_1d(np.asarray(material, dtype=np.uint32))),
+            upload(mi.UInt32, np.atleast_1d(np.asarray(material, dtype=np.uint32))),
             mi.Point2f(0.3, 0.6),
             cells,
             [mi.Float(300.25) + 0.5 * mi.Float(cell) for cell in cells],
@@ -433,12 +435,15 @@ class TestCompilation:
     def test_other_materials_of_the_same_features_compile_nothing(self) -> None:
         import drjit as dr
 
+        from fullwell.render.transport.upload import upload
+
         def compiled(materials: list[Material], cosine: float) -> int:
             bench = Bench(materials)
             u = spread_numbers(1 << 10)
             lanes = np.arange(1 << 10) % len(materials)
-            wi = bench.vectors(np.tile(towards(cosine), (1 << 10, 1)))
-            numbers = (bench.mi.Float(u[:, 0]), bench.mi.Point2f(np.ascontiguousarray(u[:, 1:].T, dtype=np.float32)))
+            wi = bench.mi.Vector3f(*(upload(bench.mi.Float, np.full(1 << 10, x, dtype=np.float32)) for x in towards(cosine)))
+            u_lobe, x, y = (upload(bench.mi.Float, column.astype(np.float32)) for column in u.T)
+            numbers = (u_lobe, bench.mi.Point2f(x, y))
             surface = bench.surface(lanes)
             drawn = surface.sample(wi, *numbers)
             value, density = surface.evaluate(wi, drawn.wo)
