@@ -103,7 +103,7 @@ def _sentence(details: Any, context: dict[str, Any]) -> str:
             return f"is {shown}; {details['msg']}."
         case "union_tag_not_found":
             return "is missing; give it."
-        case "model_attributes_type" | "model_type":
+        case "model_attributes_type" | "model_type" | "dict_type":
             return f"is {shown}; must be a mapping."
         case "literal_error":
             return _unknown_choice(value, [text.strip("'") for text in context["expected"].replace(" or ", ", ").split(", ")])
