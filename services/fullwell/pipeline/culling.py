@@ -30,7 +30,7 @@ from fullwell.scene import (
     SunSky,
 )
 
-__all__ = ["Bounds", "leave_out", "object_bounds", "out_of_view", "reach"]
+__all__ = ["Bounds", "leave_out", "object_bounds", "out_of_view", "relative_changes"]
 
 Array = NDArray[np.float64]
 
@@ -68,12 +68,10 @@ def leave_out(
     if not hidden.any():
         return scene, PlanStep(what, "run", f"the camera may see all {len(scene.objects)} objects")
     count = f"{hidden.sum()} of {len(scene.objects)} objects"
-    reflectance = largest_reflectance(scene, grid)
-    obstacle = _obstacle(scene, reflectance, weighted=weighted)
-    light = None if obstacle else _light_of(scene, grid, reflectance.value)
-    if light is None or not 0.0 < light.contrast < math.inf:
-        return scene, PlanStep(what, "run", f"{count} kept: {obstacle or 'in some band there is no light from outside'}")
-    changes = light.contrast * reach(bounds, hidden, camera, light, reflectance.value)
+    obstacle = _obstacle(scene, largest_reflectance(scene, grid), weighted=weighted)
+    if obstacle:
+        return scene, PlanStep(what, "run", f"{count} kept: {obstacle}")
+    changes = _changes(scene, camera, grid, bounds, hidden)
     order = np.argsort(changes, kind="stable")
     dropped = order[np.cumsum(changes[order]) <= _BUDGET]
     if not len(dropped):
@@ -88,16 +86,35 @@ def leave_out(
     return replace(scene, objects=kept), PlanStep(what, "skip", why, bound)
 
 
+def relative_changes(scene: SceneDescription, camera: Camera, grid: WavelengthGrid) -> Array:
+    """Return (objects,) bounds on what the absence of each does to any visible surface's irradiance, in parts of the full one.
+
+    inf for objects in view, and where nothing is known.
+    """
+    bounds = object_bounds(scene)
+    if _obstacle(scene, largest_reflectance(scene, grid), weighted=False):
+        return np.full(len(scene.objects), math.inf)
+    return _changes(scene, camera, grid, bounds, out_of_view(bounds, camera))
+
+
+def _changes(scene: SceneDescription, camera: Camera, grid: WavelengthGrid, bounds: Bounds, hidden: NDArray[np.bool_]) -> Array:
+    reflectance = largest_reflectance(scene, grid).value
+    light = _light_of(scene, grid, reflectance)
+    if not 0.0 < light.contrast < math.inf:
+        return np.full(len(hidden), math.inf)
+    return light.contrast * _reach(bounds, hidden, camera, light, reflectance)
+
+
 def _obstacle(scene: SceneDescription, reflectance: LargestReflectance, *, weighted: bool) -> str:
     """Return why nothing can be bounded, or nothing."""
     if scene.fog is not None:
         return "fog carries light from all sides"
     if not reflectance.matte:
-        return f"{reflectance.object_id} is not matte and may mirror them"
+        return f"{reflectance.object_id!r} is not matte and may mirror them"
     if weighted:
         return "the views weight light groups"
     if reflectance.value >= 1.0:
-        return f"{reflectance.object_id} returns all light"
+        return f"{reflectance.object_id!r} returns all light"
     if any(not isinstance(light, _FAR_LIGHTS) for light in scene.lights):
         return "near a point or spot light the light has no bound"
     if not scene.lights:
@@ -211,7 +228,7 @@ class _Light:
     suns: tuple[_Sun, ...]
 
 
-def reach(bounds: Bounds, hidden: NDArray[np.bool_], camera: Camera, light: _Light, reflectance: float) -> Array:
+def _reach(bounds: Bounds, hidden: NDArray[np.bool_], camera: Camera, light: _Light, reflectance: float) -> Array:
     """Return (n,) the share of a visible surface's light that may have to do with an object; inf for those not `hidden`.
 
     The chance that a walk from a visible point, along directions by the cosine law and with `reflectance` for each bounce,

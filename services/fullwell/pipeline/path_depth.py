@@ -92,7 +92,7 @@ def choose_depth(
         )
     largest = largest_reflectance(scene, grid)
     if not largest.matte:
-        why = f"up to {max_depth} segments: {largest.object_id} is not matte and may return all light"
+        why = f"up to {max_depth} segments: {largest.object_id!r} is not matte and may return all light"
         return max_depth, PlanStep(what, "run", why, _LONGER)
     enough = _shortest(largest.value, max_depth) if skip else max_depth
     bound = tail_bound(largest.value, enough)

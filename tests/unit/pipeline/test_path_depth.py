@@ -84,7 +84,7 @@ def test_nothing_is_cut_off_where_nothing_may_be_skipped() -> None:
 def test_what_is_not_matte_may_return_all_light(material: Material) -> None:
     found, step = choose_depth(scene_of(matte(0.1), material), GRID, 8, camera_name="main")
     assert found == 8
-    assert "object_1 is not matte" in step.why
+    assert "'object_1' is not matte" in step.why
     assert "not bounded" in step.error_bound
 
 
