@@ -117,10 +117,14 @@ class ScalarCaster:
             si = self._scene.ray_intersect(self._ray(direction))
             if si.is_valid():
                 normal = np.array(si.sh_frame.n, dtype=np.float64).ravel()
-                seen.objects[number] = self._object_of_shape[si.shape.id()]
+                seen.objects[number] = self._object_at(si)
                 seen.range_m[number] = float(si.t)
                 seen.normal[number] = -normal if normal @ direction > 0 else normal
         return seen
+
+    def _object_at(self, si: Any) -> int:
+        """Return the object that a ray met; a mesh that many objects share is known by its instance."""
+        return self._object_of_shape[(si.shape if si.instance is None else si.instance).id()]
 
     def first_objects(self, x_px: NDArray[np.float32], y_px: NDArray[np.float32]) -> NDArray[np.int32]:
         """Return only the `objects` of `first`."""
@@ -136,7 +140,7 @@ class ScalarCaster:
                 si = self._scene.ray_intersect(ray)
                 if not si.is_valid():
                     break
-                along.add(self._object_of_shape[si.shape.id()])
+                along.add(self._object_at(si))
                 ray = si.spawn_ray(ray.d)
             met[list(along)] += 1
         return Extents(met, None, np.empty(0, dtype=np.int64))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+from collections import Counter
 from dataclasses import dataclass
 from typing import Any
 
@@ -119,12 +120,14 @@ def _load(mi: Any, scene: SceneDescription, centre_m: NDArray[np.float64]) -> Tr
     object_of_shape: dict[str, int] = {}
     try:
         materials = _Materials(mi)
+        groups = _Groups(mi, materials, scene, contents) if mi.variant().startswith("scalar") else None
         for index, scene_object in enumerate(scene.objects):
             for number, part in enumerate(scene_object.parts):
                 shape_id = f"o{index}_{number}"
                 to_world = recentre @ scene_object.to_world @ part.to_object
                 with naming(scene_object.id, index, number):
-                    contents[shape_id] = _shape(mi, materials, shape_id, part, to_world)
+                    instance = None if groups is None else groups.instance(part, to_world)
+                    contents[shape_id] = instance or _shape(mi, materials, shape_id, part, to_world)
                 object_of_shape[shape_id] = index
         for number, light in enumerate(scene.lights):
             if not _is_black(light):
@@ -351,6 +354,50 @@ def _mesh_shape(mi: Any, shape_id: str, mesh: Mesh, bsdf: Any, emission: dict[st
         parameters["vertex_texcoords"] = np.ascontiguousarray(mesh.uv, dtype=np.float32).ravel()
     parameters.update()
     return shape
+
+
+# Instances -----------------------------------------------------------------------------------------------------------
+
+_WORTH_SHARING = 20_000
+"""Triangles that copies of a mesh would add before it is loaded once and placed by transforms.
+
+Measured with the scalar renderer: 64 copies of 20,480 triangles load in 0.2 s instead of 3.0 s and trace as fast; with 20,000
+triangles in all there is no difference."""
+
+
+class _Groups:
+    """Meshes that many parts share, loaded once: for the scalar renderer, which traces instances as fast as copies."""
+
+    def __init__(self, mi: Any, materials: _Materials, scene: SceneDescription, contents: dict[str, Any]) -> None:
+        """Prepare for a scene; the shared meshes go to `contents`, before the instances that refer to them."""
+        self._mi, self._materials, self._contents = mi, materials, contents
+        self._uses: Counter[tuple[int, int]] = Counter(
+            _group_key(part) for item in scene.objects for part in item.parts if isinstance(part.geometry, Mesh)
+        )
+        self._made: dict[tuple[int, int], str] = {}
+
+    def instance(self, part: Part, to_world: NDArray[np.float64]) -> dict[str, Any] | None:
+        """Return the part as an instance of its mesh; None where a copy serves better, and for lamps and glass."""
+        if not isinstance(part.geometry, Mesh) or part.emission is not None or isinstance(part.material, Dielectric):
+            return None
+        key = _group_key(part)
+        if (self._uses[key] - 1) * len(part.geometry.faces) < _WORTH_SHARING:
+            return None
+        if key not in self._made:
+            mesh = with_whole_normals(part.geometry)
+            name = f"group{len(self._made)}"
+            shape = _mesh_shape(self._mi, f"mesh_of_{name}", mesh, self._materials.get(part.material), None)
+            self._contents[name] = {"type": "shapegroup", "shape": shape}
+            self._made[key] = name
+        return {
+            "type": "instance",
+            "to_world": _transform(self._mi, to_world),
+            "group": {"type": "ref", "id": self._made[key]},
+        }
+
+
+def _group_key(part: Part) -> tuple[int, int]:
+    return id(part.geometry), id(part.material)
 
 
 # Lights --------------------------------------------------------------------------------------------------------------
