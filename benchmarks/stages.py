@@ -9,7 +9,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-__all__ = ["Kernels", "StageTimes", "kernel_misses", "stage_times"]
+__all__ = ["LOADING", "Kernels", "StageTimes", "kernel_misses", "stage_times"]
+
+
+LOADING = ("collect surfaces", "acceleration")
+"""Stages that a scene costs once, as long as it is kept."""
 
 
 @dataclass(slots=True)
