@@ -470,7 +470,7 @@ def _case_words(case: Case) -> Iterable[str]:
         elif name == "quality":
             yield ", ".join(f"{key.replace('_', ' ')} {quality:g}" for key, quality in value.items())
         elif name not in {"seconds", "seeds"}:
-            yield f"{value:,} {name.replace('_', ' ')}".replace(",", " ") if isinstance(value, int) else f"{name} {value:g}"
+            yield f"{value:,} {name}".replace(",", " ") if isinstance(value, int) else f"{name.replace('_', ' ')} {value:g}"
 
 
 def _cell(name: str, value: Any) -> str:

@@ -20,9 +20,9 @@ app = typer.Typer(
 
 
 def _register() -> None:
-    from fullwell.cli import doctor, local, measure, service
+    from fullwell.cli import bench, doctor, local, measure, service
 
-    for module in (local, measure, service, doctor):
+    for module in (local, measure, service, doctor, bench):
         module.register(app)
 
 
