@@ -99,7 +99,7 @@ RECIPE: dict[str, Any] = {
     "outputs": [
         "image.png", "raw.npz", "radiance.exr", "depth.exr", "normals.exr", "instances.png", "semantic.png", "labels.json",
     ],
-    "quality": {"samples_per_pixel": 384, "max_depth": 8},
+    "quality": {"noise_ratio": 1.0, "max_depth": 8},
 }  # fmt: skip
 
 

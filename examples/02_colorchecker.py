@@ -70,7 +70,7 @@ RECIPE: dict[str, Any] = {
     ],
     "vary": {"grid": {"scene.lights[0].spd": ["d65", "a", "fl11"]}},
     "outputs": ["image.png", "raw.npz", "radiance.exr", "instances.png", "semantic.png", "labels.json"],
-    "quality": {"samples_per_pixel": 64, "max_depth": 2},
+    "quality": {"noise_ratio": 0.5, "max_depth": 2},
 }
 
 

@@ -247,7 +247,7 @@ RECIPE: dict[str, Any] = {
     "outputs": [
         "image.png", "raw.npz", "radiance.exr", "depth.exr", "normals.exr", "instances.png", "semantic.png", "labels.json",
     ],
-    "quality": {"samples_per_pixel": 128, "max_depth": 6},
+    "quality": {"noise_ratio": 1.0, "max_depth": 6},
 }  # fmt: skip
 
 

@@ -92,7 +92,7 @@ RECIPE: dict[str, Any] = {
         }
     },
     "outputs": ["image.png", "raw.npz", "raw.tiff", "labels.json", "instances.png"],
-    "quality": {"samples_per_pixel": 128, "max_depth": 5},
+    "quality": {"noise_ratio": 1.0, "max_depth": 5},
 }
 
 

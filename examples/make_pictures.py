@@ -22,7 +22,7 @@ HERE = Path(__file__).parent
 WIDTH_PX = 1212
 """Width of a picture on a documentation page."""
 
-QUICK = {"quality.samples_per_pixel": "2"}
+QUICK = {"quality": "{samples_per_pixel: 2}"}
 
 
 def main(arguments: list[str]) -> None:

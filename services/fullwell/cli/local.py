@@ -23,7 +23,7 @@ __all__ = ["register"]
 
 RecipeArgument = Annotated[Path, typer.Argument(help="Recipe file, YAML or JSON.", metavar="RECIPE")]
 SetOption = Annotated[
-    list[str] | None, typer.Option("--set", help="Override one value: path=value, for example quality.samples_per_pixel=16.")
+    list[str] | None, typer.Option("--set", help="Override one value: path=value, for example quality.noise_ratio=1.")
 ]
 CacheOption = Annotated[
     Path | None,

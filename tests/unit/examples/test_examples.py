@@ -52,7 +52,11 @@ def test_yaml_and_python_give_the_same_bytes(name: str, tmp_path: Path) -> None:
     from fullwell.pipeline import run_frame
     from fullwell.storage import LocalStore
 
-    quick = {"quality.samples_per_pixel": 2, "cameras[0].sensors[0].rows": 24, "cameras[0].sensors[0].cols": 32}
+    quick = {
+        "quality": {"noise_ratio": 1.0, "max_samples_per_pixel": 8},
+        "cameras[0].sensors[0].rows": 24,
+        "cameras[0].sensors[0].cols": 32,
+    }
     hashes = []
     for kind, source in (("yaml", EXAMPLES / f"{name}.yaml"), ("python", python_recipe(name))):
         document = load_recipe(source, overrides=quick)
