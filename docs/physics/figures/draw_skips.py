@@ -34,10 +34,10 @@ def draw() -> None:
         distance_m, bound, change = np.array(rows).T
         measured.loglog(distance_m, bound, "--", color=colour, label=f"bound, reflectance {value:g}")
         measured.loglog(distance_m, change, "o-", color=colour, label="measured")
-    measured.set(xlabel="distance behind the camera [m]", ylabel="change over full irradiance", ylim=(3e-5, 2))
+    measured.set(xlabel="distance behind the camera [m]", ylabel="change over full irradiance", ylim=(2e-7, 2))
     measured.minorticks_off()
     measured.set_xticks([12, 25, 50, 100], labels=["12", "25", "50", "100"])
-    measured.legend(fontsize=7, loc="upper right", bbox_to_anchor=(1.0, 0.62))
+    measured.legend(fontsize=7, loc="lower left")
     segments = np.arange(2, 17)
     for value in (0.1, 0.3, 0.5, 0.7, 0.9):
         depth.semilogy(segments, [tail_bound(value, int(n)) for n in segments], label=f"reflectance {value:g}")

@@ -174,7 +174,7 @@ def object_bounds(scene: SceneDescription) -> Bounds:
 def _box(geometry: Geometry) -> tuple[Array, Array]:
     """Return the middle and the half edges of the box around a geometry, in its own coordinates [m]."""
     match geometry:
-        case Mesh(vertices_m=vertices):
+        case Mesh(vertices_m=vertices) if len(vertices):
             low, high = vertices.min(axis=0), vertices.max(axis=0)
             return (low + high) / 2, (high - low) / 2
         case Rectangle(size_m=(width, height)):
@@ -187,6 +187,8 @@ def _box(geometry: Geometry) -> tuple[Array, Array]:
             half = [radius, radius, 0.0]
         case Cylinder(radius_m=radius, height_m=height):
             half = [radius, radius, height / 2]
+        case _:  # a mesh of nothing, which the renderer will refuse
+            half = [0.0, 0.0, 0.0]
     return np.zeros(3), np.array(half)
 
 

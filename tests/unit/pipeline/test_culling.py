@@ -301,6 +301,11 @@ def test_a_scene_without_objects_is_left_alone() -> None:
     assert leave_out(scene, camera(), GRID)[0] is scene
 
 
+def test_a_mesh_without_vertices_is_left_for_the_renderer_to_refuse() -> None:
+    nothing = Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.uint32))
+    assert not cull(thing("empty", (0, 5, 0), nothing))[0]
+
+
 @pytest.mark.slow
 def test_planning_two_thousand_objects_takes_little_time() -> None:
     rng = np.random.default_rng(1)
