@@ -239,6 +239,7 @@ def test_exposures_are_rendered_once_and_the_longest_decides_the_samples(
 # Channels and spectra ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_channels_agree_with_the_spectrum_within_the_error_of_both(recipe: dict[str, Any], tmp_path: Path) -> None:
     recipe["quality"] = {"samples_per_pixel": 128, "max_depth": 4}
     direct = Made(recipe, tmp_path / "direct")
@@ -258,6 +259,7 @@ def test_channels_agree_with_the_spectrum_within_the_error_of_both(recipe: dict[
     assert spectral.sum() == pytest.approx(mean.sum(), rel=3e-3)
 
 
+@pytest.mark.slow
 def test_channels_are_the_same_with_bands_beside_them(recipe: dict[str, Any], tmp_path: Path) -> None:
     recipe["quality"] = {"samples_per_pixel": 64, "max_depth": 4}
     alone, _ = scatter(recipe, tmp_path / "alone")
@@ -268,6 +270,7 @@ def test_channels_are_the_same_with_bands_beside_them(recipe: dict[str, Any], tm
 # What the manifest says ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [0.25, 1.0])
 def test_stated_noise_is_that_of_repeated_renderings(recipe: dict[str, Any], tmp_path: Path, ratio: float) -> None:
     recipe["quality"] = {"noise_ratio": ratio, "max_depth": 4}
@@ -318,6 +321,7 @@ def fullwell(*words: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", code, *map(str, words)], capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 def test_command_line_can_render_and_plan_without_skips(recipe: dict[str, Any], tmp_path: Path) -> None:
     recipe["outputs"] = ["raw.npz", "image.png"]
     recipe["quality"] = {"noise_ratio": 0.3, "max_depth": 4}

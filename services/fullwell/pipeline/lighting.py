@@ -368,7 +368,8 @@ def _sampling_step(frame: FrameDescription, rig: CameraRig, views: tuple[View, .
     if quality.time_limit_s is not None:
         cap += f" and {quality.time_limit_s:g} s"
     most = quality.max_samples_per_pixel
-    cost = f"about {_cpu_s(rig, min(_LEAST_SAMPLES, most))} to {_cpu_s(rig, most)} CPU-s"
+    least, highest = _cpu_s(rig, min(_LEAST_SAMPLES, most)), _cpu_s(rig, most)
+    cost = f"about {least} CPU-s" if least == highest else f"about {least} to {highest} CPU-s"
     bound = f"{quality.noise_ratio:g} of the sensor's noise, unless a cap is reached"
     return PlanStep(what, "run", f"{size}, {cap}, until the noise allows{shared}", bound, cost)
 

@@ -368,3 +368,20 @@ def test_plan_leaves_the_frame_as_it_is(lamps: dict[str, Any]) -> None:
     plan_light(frame, frame.cameras[0], 0)
     assert frame.scene is before.scene
     assert len(frame.scene.lights) == 3
+
+
+# Cost ----------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("quality", "expected"),
+    [
+        ({"samples_per_pixel": 1000}, "about 0.26 CPU-s"),  # 24 x 16 pixels x 1000 rays at 1.5e6 a second
+        ({"noise_ratio": 0.5, "max_samples_per_pixel": 1000}, "about 0.0041 to 0.26 CPU-s"),
+        ({"noise_ratio": 0.5, "max_samples_per_pixel": 8}, "about 0.002 CPU-s"),
+    ],
+)
+def test_plan_tells_what_rendering_costs_from_least_to_most(
+    lamps: dict[str, Any], quality: dict[str, Any], expected: str
+) -> None:
+    assert step_of(plan_of(lamps | {"quality": quality}), "render").cost == expected
