@@ -284,6 +284,40 @@ def smooth_normals() -> Comparison:
     return Comparison(in_a_box(thing("gem", mesh, Diffuse(RED), placed((0.2, 0, 0.55)))), camera())
 
 
+def ball_by_a_bulb() -> Comparison:
+    """Both curved and 3 m from the camera: where rays start and end matters most."""
+    bulb = thing("bulb", Sphere(0.15), BLACK, placed((0, -0.5, 0.6)), emission=scaled(WARM, 3.0))
+    objects = (block(), ball(Diffuse(RED), centre=(0.6, 0.2, 0.5)), bulb)
+    return Comparison(on_a_floor(*objects, lights=()), camera((0, -3.4, 2.4), (0, 0, 0.4)))
+
+
+def all_kinds_of_light() -> Comparison:
+    bulb = ball_by_a_bulb()
+    lights = (
+        PointLight((-0.6, -0.4, 1.6), scaled(WARM, 0.5)),
+        DirectionalLight((0.3, 0.5, -0.8), scaled(WARM, 1.0)),
+        ConstantEnvironment(scaled(COOL, 0.3)),
+    )
+    return Comparison(SceneDescription(bulb.scene.objects, lights), bulb.camera)
+
+
+def curved_textures() -> Comparison:
+    cloth = Diffuse(Texture(np.random.default_rng(5).integers(20, 240, (6, 9, 3)).astype(np.uint8)))
+    objects = (
+        thing("globe", Sphere(0.4), cloth, placed((-0.5, -0.2, 0.45), (0.8, 0.6, 0), (0, 0, 1))),
+        thing("tube", Cylinder(0.25, 0.8), cloth, placed((0.5, -0.2, 0.5), (0.8, 0.6, 0), (-0.6, 0.8, 0))),
+        thing("disk", Disk(0.3), cloth, placed((0, 0.9, 1.3), (0.8, 0, 0.6), (-0.6, 0, 0.8))),
+        thing("chest", Cube((0.4, 0.3, 0.3)), cloth, placed((0, -0.4, 0.16), (0.8, 0.6, 0), (-0.6, 0.8, 0))),
+    )
+    return Comparison(in_a_box(*objects), camera())
+
+
+def bulb_in_glass() -> Comparison:
+    bulb = thing("bulb", Sphere(0.2), BLACK, placed((0.2, 0, 0.8)), emission=scaled(WARM, 6.0))
+    glass = ball(Dielectric(1.5, 1.0), 0.35, (0.2, 0, 0.8))
+    return Comparison(in_a_box(block(), bulb, glass, lamp=False), camera(), depth=10, samples=100)
+
+
 SCENES: dict[str, Callable[[], Comparison]] = {
     function.__name__: function
     for function in (
@@ -305,5 +339,9 @@ SCENES: dict[str, Callable[[], Comparison]] = {
         textured_floor,
         thin_lens,
         smooth_normals,
+        ball_by_a_bulb,
+        all_kinds_of_light,
+        curved_textures,
+        bulb_in_glass,
     )
 }
