@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -25,13 +25,19 @@ __all__ = [
 
 _FARTHEST_CENTRE_M = 1e8
 _SMALLEST_REACH_M = 5e-3
-"""Fifty times the distance off a surface at which rays start."""
+"""Fifty times the distance off a surface at which Mitsuba's own integrators start rays."""
 
 RAY_START = 9e-5
-"""Times 1 m + the largest coordinate: how far off a surface the renderer starts rays, so that it does not shadow itself."""
+"""Times 1 m + the largest coordinate: how far off a surface Mitsuba's own integrators start rays."""
 
 _ONE_SURFACE = 0.1
 """Share of their area that the triangles' area vectors add up to: none in a body, all in the surface of still water."""
+
+_PARALLEL = 0.9
+"""Cosine between the normals of triangles of a pane's two sides, at least."""
+
+_THINNEST = 1.25
+"""Thickness of the thinnest pane, in the distances that rays skip; the vertices of its sides are themselves rounded."""
 
 _EMITTER_AREA_TOLERANCE = 0.05
 """Relative change of a lamp's area by the rounding of its vertices to single precision that its radiance may make up for."""
@@ -136,14 +142,17 @@ def power_kept(mesh: Mesh, radiance: Spectrum) -> Spectrum:
     return radiance if abs(rounded - exact) <= _AREA_ROUNDING * exact else radiance.scaled(exact / rounded)
 
 
-def check_glass_thickness(mesh: Mesh, *, ray_start: float = RAY_START, least_m: float = 1.0) -> None:
+def check_glass_thickness(
+    mesh: Mesh, skipped: Callable[[NDArray[np.float64], NDArray[np.float64]], float] | None = None
+) -> None:
     """Refuse a pane of glass whose second side rays would skip.
 
-    They start `ray_start` times (`least_m` + the largest coordinate) off the first.
+    Parameters
+    ----------
+    skipped
+        Distance [m] off the pane's sides at which rays start, of their (n, 3, 3) corners [m] and (n, 3) unit normals. By
+        default that of Mitsuba's own integrators.
     """
-    low, high = mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)
-    nearest_m = float(np.maximum(np.maximum(low, -high), 0.0).max())
-    skipped_m = ray_start * (least_m + nearest_m)
     corners = mesh.vertices_m[mesh.faces]
     crossed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     doubled = np.linalg.norm(crossed, axis=1)
@@ -151,14 +160,22 @@ def check_glass_thickness(mesh: Mesh, *, ray_start: float = RAY_START, least_m: 
         return
     # The extent along the normal of the largest triangle is a pane's thickness, whatever its pose.
     largest = int(doubled.argmax())
-    heights = (mesh.vertices_m - corners[largest, 0]) @ (crossed[largest] / doubled[largest])
-    thickness_m = float(np.ptp(heights))
-    if thickness_m < skipped_m:
+    normal = crossed[largest] / doubled[largest]
+    thickness_m = float(np.ptp((mesh.vertices_m - corners[largest, 0]) @ normal))
+    sides = np.abs(crossed @ normal) > _PARALLEL * doubled
+    skipped_m = (skipped or _skipped_m)(corners[sides], crossed[sides] / doubled[sides, None])
+    if thickness_m < _THINNEST * skipped_m:
         raise FieldError(
-            f"its glass of {thickness_m:.2g} m is {nearest_m:.3g} m away from the camera, where rays skip {skipped_m:.2g} m; "
-            "must be thicker. Leave the pane out, or move the camera nearer.",
+            f"its glass of {thickness_m:.2g} m is up to {np.abs(corners[sides]).max():.3g} m away from the camera, where rays "
+            f"skip {skipped_m:.2g} m; must be >= {_THINNEST * skipped_m:.2g} m. Leave the pane out, or move the camera nearer.",
             path="geometry",
         )
+
+
+def _skipped_m(corners: NDArray[np.float64], normals: NDArray[np.float64]) -> float:
+    del normals
+    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    return RAY_START * (1.0 + float(np.maximum(np.maximum(low, -high), 0.0).max()))
 
 
 def _area_m2(mesh: Mesh, rounded_to: type[np.float32 | np.float64]) -> float:

@@ -22,7 +22,7 @@ from fullwell.scene.groups import group_names
 from fullwell.scene.tessellate import is_similarity, mesh_of, transform_mesh
 from fullwell.scene.validate import check_scene, may_repeat_faces
 
-__all__ = ["BLACK", "RAY_OFFSET", "collect_surfaces"]
+__all__ = ["BLACK", "CURVED_OFFSET", "RAY_OFFSET", "collect_surfaces"]
 
 BLACK = 1e-35
 """Spectra below this are black: single precision has nothing smaller to work with."""
@@ -30,7 +30,11 @@ BLACK = 1e-35
 RAY_OFFSET = 1.5e-6
 """How far off a triangle rays start, times its largest coordinates along its normal: 25 roundings of single precision."""
 
-_SMALLEST_REACH_M = 1e-5
+CURVED_OFFSET = 3e-6
+"""The same off curved shapes, times the coordinates of their centre and their diameter together."""
+
+_SMALLEST_REACH_M = 1e-8
+"""Scenes of a hundredth of this are still right; at a thousandth, squares of distances leave single precision."""
 
 
 def collect_surfaces(scene: SceneDescription, centre_m: NDArray[np.float64]) -> SceneSurfaces:
@@ -84,7 +88,7 @@ class _Collector:
                 mesh = _front_by_winding(mesh)
                 radiance = power_kept(mesh, radiance)
             if isinstance(part.material, Dielectric):
-                check_glass_thickness(mesh, ray_start=2 * RAY_OFFSET, least_m=0.0)
+                check_glass_thickness(mesh, _skipped_m)
             self.pieces.append(_Piece(mesh, len(self.parts), radiance is not None))
         else:
             self.curved.append((curved, radiance is not None))
@@ -133,6 +137,12 @@ def _curved(part: Part, to_world: NDArray[np.float64], number: int) -> CurvedSha
             return CurvedShape("cylinder", placed, number, half_height=height / 2 / radius)
         case _:
             return None
+
+
+def _skipped_m(corners: NDArray[np.float64], normals: NDArray[np.float64]) -> float:
+    """Return the largest distance [m] off triangles of (n, 3, 3) `corners` at which rays start."""
+    reach = np.abs(corners).max(axis=1)
+    return RAY_OFFSET * float(np.einsum("ij,ij->i", np.abs(normals), reach).max())
 
 
 def _front_by_winding(mesh: Mesh) -> Mesh:
