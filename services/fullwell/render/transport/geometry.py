@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fullwell.render.transport.collect import RAY_OFFSET
+from fullwell.render.transport.collect import CURVED_OFFSET, RAY_OFFSET
 from fullwell.render.transport.surfaces import CurvedShape, SceneSurfaces
 from fullwell.render.transport.upload import upload
 
@@ -15,9 +15,6 @@ __all__ = ["Geometry", "Hit", "Tables"]
 
 _CURVED_FLOATS = 16
 _KINDS = {"sphere": 0, "disk": 1, "cylinder": 2}
-_CURVED_OFFSET = 3e-6
-"""The same for curved shapes, times the distance of the hit from the origin and the radius."""
-
 _NO_LEAF = 0xFFFFFFFF
 _MESH = 0xFFFFFFFF
 _ESCAPE = 1e-12
@@ -206,7 +203,7 @@ class Geometry:
         hit.front_normal = dr.select(active, normal, hit.front_normal)
         hit.shading_normal = dr.select(active, normal, hit.shading_normal)
         hit.uv = dr.select(active, uv, hit.uv)
-        hit.offset_m = dr.select(active, _CURVED_OFFSET * extent, hit.offset_m)
+        hit.offset_m = dr.select(active, CURVED_OFFSET * extent, hit.offset_m)
         hit.part = dr.select(active, part, hit.part)
         hit.leaf = dr.select(active, leaf, hit.leaf)
 

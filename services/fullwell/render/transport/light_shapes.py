@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fullwell.render.transport.collect import CURVED_OFFSET, RAY_OFFSET
 from fullwell.render.transport.upload import upload
 
 __all__ = ["CYLINDER", "DISK", "LEAF_FLOATS", "SPHERE", "LeafTable", "ShapeSample"]
@@ -24,13 +25,19 @@ _LARGEST_SR = 6.22
 uniformly over their area. Below, the two differ by less than the light varies over a lamp of 3 degrees."""
 
 _NEAREST_M2 = 1e-20
+_CLEARANCE = 1e-6
+"""How far off a lamp shadow rays end, times their length, beside what rays keep off that surface anyway: the point on the lamp
+comes from direction and distance, which are rounded."""
 
 
 class ShapeSample:
-    """Direction (unit), distance [m] and density [sr^-1] of a chosen direction; density 0 where nothing is to be had."""
+    """Direction (unit), distance [m] and density [sr^-1] of a chosen direction; density 0 where nothing is to be had.
 
-    def __init__(self, direction: Any, distance: Any, pdf: Any) -> None:
-        self.direction, self.distance, self.pdf = direction, distance, pdf
+    `clearance` [m] is the vector from the lamp's surface to where a ray towards it ends.
+    """
+
+    def __init__(self, direction: Any, distance: Any, pdf: Any, clearance: Any) -> None:
+        self.direction, self.distance, self.pdf, self.clearance = direction, distance, pdf, clearance
 
 
 class LeafTable:
@@ -105,7 +112,16 @@ class LeafTable:
         distance = dr.select(by_angle, dr.minimum(height / facing, farthest), dr.norm(place))
         density = self._triangle_density(solid_angle, crossed, facing, distance)
         good = (height > 0) & (facing > 0) & (distance > 0)
-        return ShapeSample(mi.Vector3f(direction), distance, dr.select(good, density, 0.0))
+        clearance = self._clearance(record, crossed, distance)
+        return ShapeSample(mi.Vector3f(direction), distance, dr.select(good, density, 0.0), clearance)
+
+    def _clearance(self, record: tuple[Any, Any, Any], crossed: Any, distance: Any) -> Any:
+        """Return the vector [m] off a triangle that rays keep, as in `Geometry`."""
+        dr, mi = self._dr, self._mi
+        first, second, third = (mi.Vector3f(part.x, part.y, part.z) for part in record)
+        reach = dr.maximum(dr.maximum(dr.abs(first), dr.abs(first + second)), dr.abs(first + third))
+        normal = dr.normalize(crossed * dr.rcp(dr.maximum(dr.max(dr.abs(crossed)), 1e-37)))
+        return normal * (RAY_OFFSET * dr.dot(dr.abs(normal), reach) + _CLEARANCE * distance)
 
     def _triangle_density(self, solid_angle: Any, crossed: Any, facing: Any, distance: Any) -> Any:
         """`facing` is twice the area times the cosine at the lamp."""
@@ -155,7 +171,7 @@ class LeafTable:
         """Choose a direction to a sphere (over its cone), a disk (over its area) or the near side of a cylinder."""
         dr, mi = self._dr, self._mi
         way, axis, radius, half_height, kind = self._placed(record, point)
-        sphere = self._sample_sphere(way, radius, u)
+        of_sphere = self._sample_sphere(way, radius, u)
         side, up = self._side_of(axis)
         turn_sin, turn_cos = dr.sincos(2.0 * np.pi * u.y)
         root = dr.sqrt(u.x) * radius
@@ -174,11 +190,13 @@ class LeafTable:
         good = (cosine > 0) & (distance2 > _NEAREST_M2) & (is_disk | outside)
         density = dr.select(good, distance2 / (cosine * area), 0.0)
         is_sphere = kind == SPHERE
-        return ShapeSample(
-            mi.Vector3f(dr.select(is_sphere, sphere.direction, direction)),
-            dr.select(is_sphere, sphere.distance, dr.sqrt(distance2)),
-            dr.select(is_sphere, sphere.pdf, density),
-        )
+        direction = mi.Vector3f(dr.select(is_sphere, of_sphere[0], direction))
+        distance = dr.select(is_sphere, of_sphere[1], dr.sqrt(distance2))
+        normal = dr.select(is_sphere, dr.normalize(direction * distance - way), normal)
+        first = record[0]
+        extent = dr.abs(first.x) + dr.abs(first.y) + dr.abs(first.z) + 2.0 * radius
+        clearance = normal * (CURVED_OFFSET * extent + _CLEARANCE * distance)
+        return ShapeSample(direction, distance, dr.select(is_sphere, of_sphere[2], density), mi.Vector3f(clearance))
 
     def _placed(self, record: tuple[Any, Any, Any], point: Any) -> tuple[Any, Any, Any, Any, Any]:
         mi = self._mi
@@ -207,7 +225,8 @@ class LeafTable:
         sin2 = dr.minimum(radius * radius / dr.maximum(distance2, _NEAREST_M2), 1.0)
         return distance2, sin2 / (1.0 + dr.safe_sqrt(1.0 - sin2)), outside
 
-    def _sample_sphere(self, way: Any, radius: Any, u: Any) -> ShapeSample:
+    def _sample_sphere(self, way: Any, radius: Any, u: Any) -> tuple[Any, Any, Any]:
+        """Return direction, distance and density."""
         dr, mi = self._dr, self._mi
         distance2, opening, outside = self._cone(way, radius)
         middle = way * dr.rsqrt(dr.maximum(distance2, _NEAREST_M2))
@@ -221,7 +240,7 @@ class LeafTable:
         distance = reach * (1.0 - drop) - dr.safe_sqrt(radius * radius - distance2 * sin2)
         good = outside & (opening > 0)
         density = dr.select(good, 1.0 / (2.0 * np.pi * dr.select(good, opening, 1.0)), 0.0)
-        return ShapeSample(mi.Vector3f(direction), dr.maximum(distance, 0.0), density)
+        return mi.Vector3f(direction), dr.maximum(distance, 0.0), density
 
     def curved_density(self, record: tuple[Any, Any, Any], point: Any, direction: Any, distance: Any, normal: Any) -> Any:
         """Return the density with which `sample_curved` chooses a direction that meets the shape at `distance` and `normal`."""
@@ -249,4 +268,5 @@ class LeafTable:
         share = dr.select(inverse_edge > 0, dr.clip((cutoff_rad - angle) * inverse_edge, 0.0, 1.0), 1.0)
         good = (distance2 > _NEAREST_M2) & (share > 0)
         scale = dr.select(good, share / dr.maximum(distance2, _NEAREST_M2), 0.0)
-        return ShapeSample(direction, dr.sqrt(distance2), dr.select(good, 1.0, 0.0)), scale
+        nothing = dr.zeros(self._mi.Vector3f, dr.width(distance2))
+        return ShapeSample(direction, dr.sqrt(distance2), dr.select(good, 1.0, 0.0), nothing), scale

@@ -65,6 +65,8 @@ class LightSample:
         Unit vector from the point to the light.
     distance
         [m], infinite for environments, sun and directional lights.
+    clearance
+        Vector [m] from there to just off the lamp's own surface; zero for lights without one.
     pdf
         Density over solid angle [sr^-1] that the direction is chosen, the choice of the light included; for a `delta` light the
         probability of its choice. 0 where nothing was found.
@@ -76,6 +78,7 @@ class LightSample:
 
     direction: Any
     distance: Any
+    clearance: Any
     pdf: Any
     delta: Any
     group: Any
@@ -191,6 +194,7 @@ class LightSet:
         found = LightSample(
             direction=dr.zeros(mi.Vector3f, width),
             distance=dr.zeros(mi.Float, width),
+            clearance=dr.zeros(mi.Vector3f, width),
             pdf=dr.zeros(mi.Float, width),
             delta=dr.zeros(mi.Bool, width),
             group=none,
@@ -227,7 +231,7 @@ class LightSet:
         record = self._leaves.record(leaf, active)
         row, group = self._leaves.row_and_group(record[0], record[1])
         shape = self._leaves.sample_triangle(record, point, u)
-        direction, distance, pdf = shape.direction, shape.distance, shape.pdf
+        direction, distance, pdf, clearance = shape.direction, shape.distance, shape.pdf, shape.clearance
         scale = dr.full(mi.Float, 1.0, dr.width(u_select))
         delta = dr.zeros(mi.Bool, dr.width(u_select))
         if "curved" in self.features:
@@ -235,14 +239,17 @@ class LightSet:
             direction = dr.select(is_curved, curved.direction, direction)
             distance = dr.select(is_curved, curved.distance, distance)
             pdf = dr.select(is_curved, curved.pdf, pdf)
+            clearance = dr.select(is_curved, curved.clearance, clearance)
         if "point" in self.features:
             (single, falloff), delta = self._leaves.sample_point(record, point), self._leaves.is_point(leaf)
             direction = dr.select(delta, single.direction, direction)
             distance = dr.select(delta, single.distance, distance)
             pdf = dr.select(delta, single.pdf, pdf)
+            clearance = dr.select(delta, single.clearance, clearance)
             scale = dr.select(delta, falloff, scale)
         pdf = dr.select(active, pdf * probability * self._share["tree"], 0.0)
-        return LightSample(direction, distance, pdf, delta, group, row, scale, dr.zeros(mi.Bool, dr.width(pdf)), self)
+        no_dome = dr.zeros(mi.Bool, dr.width(pdf))
+        return LightSample(direction, distance, clearance, pdf, delta, group, row, scale, no_dome, self)
 
     def _sample_environment(self, point: Any, normal: Any, u_select: Any, u: Any, active: Any) -> LightSample:
         mi, dr = self._mi, self._dr
@@ -266,9 +273,8 @@ class LightSet:
         none, far = dr.zeros(mi.UInt32, width), dr.full(mi.Float, dr.inf, width)
         group = none + self._environment_group
         ones = dr.full(mi.Float, 1.0, width)
-        return LightSample(
-            direction, far, pdf, dr.zeros(mi.Bool, width), group, none, ones, dr.full(mi.Bool, True, width), self
-        )
+        no, yes, nothing = dr.zeros(mi.Bool, width), dr.full(mi.Bool, True, width), dr.zeros(mi.Vector3f, width)
+        return LightSample(direction, far, nothing, pdf, no, group, none, ones, yes, self)
 
     def _sample_distant(self, point: Any, normal: Any, u_select: Any, u: Any, active: Any) -> LightSample:
         mi, dr = self._mi, self._dr
@@ -292,7 +298,8 @@ class LightSet:
         row, group = dr.reinterpret_array(mi.UInt32, first.w), dr.reinterpret_array(mi.UInt32, second.y)
         pdf = dr.select(active, second.x * self._share["distant"], 0.0)
         far, ones = dr.full(mi.Float, dr.inf, width), dr.full(mi.Float, 1.0, width)
-        return LightSample(direction, far, pdf, dr.full(mi.Bool, True, width), group, row, ones, dr.zeros(mi.Bool, width), self)
+        no, yes, nothing = dr.zeros(mi.Bool, width), dr.full(mi.Bool, True, width), dr.zeros(mi.Vector3f, width)
+        return LightSample(direction, far, nothing, pdf, yes, group, row, ones, no, self)
 
     def _radiance(self, sample: LightSample, spectra_device: Any, cells: list[Any]) -> Any:
         dr = self._dr
@@ -362,7 +369,7 @@ class LightSet:
 
 def _take(dr: Any, found: LightSample, other: LightSample, chosen: Any) -> None:
     """Put `other` into `found` where `chosen`."""
-    for name in ("direction", "distance", "pdf", "delta", "group", "_row", "_scale", "_dome"):
+    for name in ("direction", "distance", "clearance", "pdf", "delta", "group", "_row", "_scale", "_dome"):
         setattr(found, name, dr.select(chosen, getattr(other, name), getattr(found, name)))
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from fullwell.render.rays import CameraRays
 from fullwell.render.transport.fog import FogLayer
 from fullwell.render.transport.geometry import Geometry, Tables
-from fullwell.render.transport.lights import LightSet
+from fullwell.render.transport.lights import LightSample, LightSet
 from fullwell.render.transport.materials import MaterialTable
 from fullwell.render.transport.sampler import PathSampler
 from fullwell.render.transport.wavelengths import CELL_COUNT, CELL_NM, FIRST_EDGE_NM, look_up
@@ -19,8 +19,8 @@ SLOTS = 4096
 """Equal shares of probability that wavelengths are drawn from; a cell has a whole number of them."""
 
 _NO_LEAF = 0xFFFFFFFF
-_SHADOW_SHARE = 1.0 - 5e-5
-"""Share of the way to a lamp that a shadow ray looks at; the rest holds the lamp's own surface."""
+_SHADOW_SHARE = 1.0 - 1e-6
+"""Share of the way to just before a lamp that a shadow ray looks at: the rest is rounding."""
 
 _FAR = 3e38
 _CAMERA_PAIRS = 3
@@ -161,6 +161,22 @@ class PathLoop:
             bands.append(position - (position // tables["band_count"]) * tables["band_count"])
         return bands
 
+    def _shadow_ray(self, start: Any, point: Any, light: LightSample) -> Any:
+        """Return the ray from `start`, just off the surface at `point`, to just off the lamp's own surface.
+
+        Both ends move: near a lamp but far from the origin the two offsets are a large share of the way, and a ray along the
+        light's direction would end behind the lamp or short of what stands before it.
+        """
+        mi, dr = self._mi, self._dr
+        endless = dr.isinf(light.distance)
+        end = point + light.direction * dr.select(endless, 0.0, light.distance) + light.clearance
+        way = mi.Vector3f(end - start)
+        length = dr.norm(way)
+        ahead = dr.dot(way, light.direction) > 0
+        direction = dr.select(endless, light.direction, way * dr.rcp(dr.maximum(length, 1e-30)))
+        reach = dr.select(endless, _FAR, dr.select(ahead, length * _SHADOW_SHARE, 0.0))
+        return mi.Ray3f(mi.Ray3f(o=start, d=direction), reach)
+
     def _to_channels(self, tables: Tables, radiance: Any, cells: Any) -> list[Any]:
         """Return the channels' responses to a path's spectral radiance; the weights hold the density of the wavelengths."""
         mi, dr = self._mi, self._dr
@@ -245,8 +261,10 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
             shines = hit.valid & (hit.leaf != _NO_LEAF) & (dr.dot(hit.front_normal, direction) < 0)
             if shines:
                 row, group = self._lights.hit_emission(hit.leaf, shines)
+                # From the point itself: the ray starts off it by what may be a large share of the way.
+                between = dr.norm(hit.point - last_point)
                 other = self._lights.hit_density(
-                    hit.leaf, last_point, last_normal, direction, hit.distance, hit.front_normal, shines & (last_density > 0)
+                    hit.leaf, last_point, last_normal, direction, between, hit.front_normal, shines & (last_density > 0)
                 )
                 share = dr.select(last_density > 0, last_density / (last_density + other), 1.0)
                 radiance = self._added(
@@ -283,8 +301,7 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
                         value, density = dr.select(in_fog, phase, value), dr.select(in_fog, phase, density)
                     useful = lit & (light.pdf > 0) & dr.any(value > 0)
                     start = hit.start(light.direction, mi, dr)
-                    reach = dr.minimum(light.distance * _SHADOW_SHARE, _FAR)
-                    shadow = mi.Ray3f(mi.Ray3f(o=start, d=light.direction), reach)
+                    shadow = self._shadow_ray(start, hit.point, light)
                     useful &= ~given.scene.ray_test(shadow, coherent=False, active=useful)
                     share = dr.select(light.delta, 1.0, light.pdf / (light.pdf + density))
                     arriving = light.radiance(given.tables["spectra"], cell_list) * (share / light.pdf)
