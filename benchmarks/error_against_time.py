@@ -108,7 +108,7 @@ def measure_scene(scene: str, settings: Settings, store: ResultStore, deadline: 
                 expected_s = _expected_cpu_s(costs.get(name), budget)
                 if expected_s > settings.most_cpu_s or not deadline.allows(expected_s / 2):
                     continue
-                first_s = _warmed(engines[name], frame, settings.budgets(name)[0]) if name not in warm else None
+                first_s = _warmed(engines[name], frame, settings.budgets(name)) if name not in warm else None
                 warm.add(name)
                 known = _measured(engines[name], frame, budget, seed, judges[name == "mitsuba"])
                 known |= {"short": name, "reference": own.samples, "first_call_cpu_s": first_s}
@@ -179,13 +179,17 @@ def _expected_cpu_s(last: tuple[float, float] | None, budget: Budget) -> float:
     return cpu_s * budget.samples_per_pixel / amount
 
 
-def _warmed(engine: Engine, frame: FrameDescription, cheapest: Budget) -> float:
-    """Make an engine load and compile what it keeps, and return the CPU-seconds of its very first call."""
+def _warmed(engine: Engine, frame: FrameDescription, budgets: tuple[Budget, ...]) -> float:
+    """Make an engine load and compile what it keeps, and return the CPU-seconds of its very first call.
+
+    Mitsuba's samplers have kernels of their own for each number of samples, up to that of a pass.
+    """
     watch = Stopwatch()
-    engine.render(frame, cheapest)
+    engine.render(frame, budgets[0])
     first_s = watch.read()[0]
-    for seed in range(2):  # recordings are made by the first two calls
-        engine.render(frame, Budget(cheapest.samples_per_pixel, seed=900 + seed, noise_ratio=cheapest.noise_ratio))
+    for budget in [budgets[0], *(other for other in budgets if other.noise_ratio is None)]:  # the first two calls record
+        if budget.samples_per_pixel <= _PASS_SAMPLES:
+            engine.render(frame, Budget(budget.samples_per_pixel, seed=900, noise_ratio=budget.noise_ratio))
     return first_s
 
 
@@ -266,21 +270,23 @@ def report(store: ResultStore, size: tuple[int, int], command: str) -> str:
     text = [f"{size[0]} x {size[1]} pixels, path loop {path_version()}. Made by\n\n```sh\n{command}\n```", _pair_table(runs)]
     text.append(_reference_table(references))
     text.append(_run_table(runs))
+    text.append("\n".join(f"![{scene}: error against CPU-seconds](error_{scene}.png)" for scene in runs))
     return "\n\n".join(text)
 
 
 def _pair_table(runs: dict[str, Curves]) -> str:
     rows = []
     for scene, curves in runs.items():
-        for first, second, _ in PAIRS:
+        for first, second, aim in PAIRS:
             if not (curves.get(first) and curves.get(second)):
                 continue
             cells = []
             for measure in MEASURES:
                 found = paired_ratio(curves[first], curves[second], measure)
                 cells.append("-" if found is None else "{1:.2f} ({2:.2f}-{3:.2f}) at {0:.2g}".format(*found))
+            cells.append(f"{aim:g}" if aim is not None and scene.startswith("street") else "")
             rows.append([f"`{scene}`", f"{first} / {second}", *cells])
-    header = ["Scene", "CPU-seconds of", *(f"at equal {title}" for title in MEASURES.values())]
+    header = ["Scene", "CPU-seconds of", *(f"at equal {title}" for title in MEASURES.values()), "aim, worst tile"]
     told = "Ratios of CPU-seconds at equal error: median over seeds, range, and the error in units of the sensor's noise.\n\n"
     return told + markdown_table(header, rows, left=2)
 

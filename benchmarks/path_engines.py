@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import gc
 import hashlib
-import importlib.util
+import importlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -160,7 +160,11 @@ class ReferencePath:
 
 def denoiser_found() -> bool:
     """Return whether Open Image Denoise can be loaded (`pip install mitsuba-oidn`)."""
-    return importlib.util.find_spec("mitsuba_oidn") is not None
+    try:
+        importlib.import_module("mitsuba_oidn")
+    except ImportError:
+        return False
+    return True
 
 
 @dataclass(eq=False)
