@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -271,7 +271,6 @@ class SunSky:
     ground_albedo: float = 0.2
     sun_weight: float = 1.0
     sky_weight: float = 1.0
-    kind: Literal["hosek-wilkie"] = "hosek-wilkie"
     group: str = "default"
 
 
