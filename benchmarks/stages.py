@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-__all__ = ["LOADING", "Kernels", "StageTimes", "kernel_misses", "stage_times"]
+__all__ = ["LOADING", "Kernels", "StageTimes", "kernel_misses", "launch_recordings", "stage_times"]
 
 
 LOADING = ("collect surfaces", "acceleration")
@@ -104,3 +104,10 @@ def kernel_misses() -> Iterator[Kernels]:
             counted.launched = len(history)
             counted.compiled = sum(not entry["cache_hit"] for entry in history)
             counted.from_disk = sum(bool(entry["cache_hit"] and entry.get("cache_disk")) for entry in history)
+
+
+def launch_recordings() -> int:
+    """Return how many recordings of launches this process has made; each costs some tenths of a second of tracing Python."""
+    from fullwell.render.transport import replay  # noqa: PLC0415 - loaded with the renderer
+
+    return sum(frozen.n_recordings for frozen, *_ in replay._recordings.values())
