@@ -26,7 +26,6 @@ _FAR = 3e38
 _CAMERA_PAIRS = 3
 _BOUNCE_PAIRS = 5
 _ROULETTE_START = 2
-_MOST_LIKELY = 0.95
 
 
 class Launch:
@@ -323,8 +322,9 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
             eta = eta * dr.select(in_fog, 1.0, bounce.eta)
             strongest = dr.max(throughput)
             finished |= alive & ~(strongest > 0)
-            # Russian roulette by what is left of the path's weight; radiance in glass is denser by the index squared
-            survival = dr.select(depth < _ROULETTE_START, 1.0, dr.minimum(strongest * eta * eta, _MOST_LIKELY))
+            # Russian roulette by what is left of the path's weight; radiance in glass is denser by the index squared.
+            # A path that lost nothing goes on, to `max_depth`: its end by chance is noise without bound where nothing absorbs.
+            survival = dr.select(depth < _ROULETTE_START, 1.0, dr.minimum(strongest * eta * eta, 1.0))
             finished |= alive & (texture_pair.x >= survival)
             throughput = throughput * dr.rcp(dr.maximum(survival, 1e-6))
             origin = hit.start(onward, mi, dr)
