@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -19,6 +19,7 @@ from test_analytic_scenes import ANALYTIC_TOLERANCE, ONE, camera, radiance_w, th
 
 from fullwell.core.errors import FieldError, FullwellError
 from fullwell.radiometry import Spectrum, WavelengthGrid, illuminant, scale_to_luminance
+from fullwell.radiometry.glasses import glass
 from fullwell.scene import (
     Camera,
     Conductor,
@@ -31,6 +32,7 @@ from fullwell.scene import (
     Disk,
     Emission,
     Film,
+    Fog,
     Geometry,
     ImageEnvironment,
     Light,
@@ -54,11 +56,16 @@ from fullwell.scene.tessellate import mesh_of
 SPLIT_TOLERANCE = 1e-2
 """Four standard errors of the difference of two images whose lamps are sampled by different random numbers."""
 
+SLOPE_TOLERANCE = 3e-3
+"""Rays start 7 mm off a slope of 10 km, whose corners have large coordinates along its normal: so much of the shadow of a box
+of 10 cm is lost."""
+
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "validation" / "stability.md"
 
 constant = Spectrum.constant
 GREY, WHITE, BLACK = Diffuse(constant(0.5)), Diffuse(constant(1.0)), Diffuse(constant(0.0))
 DOME = (ConstantEnvironment(ONE),)
+SUN = (DirectionalLight((-1.0, -0.5, -1.0), ONE),)
 QUAD = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
 QUAD_FACES = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.uint32)
 DAYLIGHT = scale_to_luminance(illuminant("D65"), 1000.0)
@@ -75,11 +82,16 @@ class Shot:
     spp: int = 64
     depth: int = 8
     grid: WavelengthGrid = ONE_BAND
+    fog: Fog | None = None
+
+    def scene(self) -> SceneDescription:
+        """Return what is before the camera."""
+        return SceneDescription(self.objects, self.lights, fog=self.fog)
 
     def image(self) -> np.ndarray:
         """Return the band radiances [W sr^-1 m^-2 nm^-1]."""
         view = self.view or camera(rows=12, cols=16, hfov_deg=5)
-        return radiance_w(SceneDescription(self.objects, self.lights), view, spp=self.spp, depth=self.depth, grid=self.grid)
+        return radiance_w(self.scene(), view, spp=self.spp, depth=self.depth, grid=self.grid)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,11 +214,11 @@ def seen(radiance: Spectrum, **more) -> Shot:
     return Shot((thing(Rectangle((10, 10)), 0.0, emission=Emission(radiance)),), **more)
 
 
-def box(reflectance: float, depth: int) -> Shot:
+def box(reflectance: float, depth: int, spp: int = 256) -> Shot:
     """Return the inside of a closed box of radiance 1."""
     outward = mesh_of(Cube((4, 4, 4)))
     inward = thing(Mesh(outward.vertices_m, outward.faces[:, ::-1]), reflectance, emission=Emission(ONE))
-    return Shot((inward,), (), camera(origin=(0, 0.2, 0), target=(1, 0, 0.3), rows=12, cols=16), spp=256, depth=depth)
+    return Shot((inward,), (), camera(origin=(0, 0.2, 0), target=(1, 0, 0.3), rows=12, cols=16), spp=spp, depth=depth)
 
 
 def furnished_box() -> Shot:
@@ -381,7 +393,7 @@ _SHAPES = [
         lambda: behind(made(Cube((30, 30, 5e-6)), Dielectric(1.5, 1.0), shifted(z=1))),
         (THING, "glass", "must be >= 7.5e-06 m"),
     ),
-    Hostile("scene of 0.1 nm", lambda: scaled(1e-10), ("must reach", "Scale")),
+    Hostile("scene of 10 nm", lambda: scaled(1e-8), ("must reach", "Scale")),
 ]
 
 _MATERIALS = [
@@ -492,6 +504,105 @@ def point_lights(count: int) -> Shot:
     return lit(*[PointLight((0.0, 0.0, 2.0), constant(3.0 / count))] * count, spp=256)
 
 
+def point_lights_each(intensities: Sequence[float], **more) -> Shot:
+    """Return the ground below point lights of these intensities, all in one place."""
+    return lit(*[PointLight((0.0, 0.0, 2.0), constant(value)) for value in intensities], spp=1024, **more)
+
+
+def faint_above_a_bright_one() -> Shot:
+    """Return the ground between 2000 faint lamps and one of 1e12 W that it hides."""
+    faint = [PointLight((0.0, 0.0, 2.0), constant(1e-9 / (4 * np.pi)))] * 2000
+    return lit(*faint, PointLight((0.0, 0.0, -2.0), constant(1e12 / (4 * np.pi))), spp=256)
+
+
+def standing_lamp(height_m: float) -> Shot:
+    """Return the ground beside a glowing cube that stands on it, or almost."""
+    cube = SceneObject("lamp", "", (Part(Cube(), BLACK, emission=Emission(ONE)),), shifted(z=0.5 + height_m))
+    return Shot((ground(), cube), (), camera(origin=(3, 0, 1), target=(0.8, 0, 0), rows=12, cols=16, hfov_deg=5), spp=4096)
+
+
+def two_in_one_place(front: Material, back: Material) -> Shot:
+    """Return two coincident squares above a lamp, lit by the dome."""
+    glow = thing(Rectangle((10, 10)), 0.0, emission=Emission(constant(100.0)), to_world=shifted(z=-1.0), name="below")
+    squares = made(quad(4 * QUAD), front, name="one"), made(quad(4 * QUAD), back, name="other")
+    return Shot((*squares, glow), DOME)
+
+
+def needles(aspect: float) -> Mesh:
+    """Return a square of 2 m whose middle is cut into 200 strips of this aspect."""
+    x = np.concatenate([[-1], 2 / aspect * np.arange(-100, 101), [1]])
+    vertices = np.stack([np.repeat(x, 2), np.tile([-1.0, 1.0], len(x)), np.zeros(2 * len(x))], axis=1)
+    first = 2 * np.arange(len(x) - 1)[:, None]
+    return quad(vertices, (first + [[0, 2, 3, 0, 3, 1]]).reshape(-1, 3))
+
+
+def on_needles(geometry: Geometry) -> Shot:
+    """Return the strips' middle, askew to all axes, under a light askew to it."""
+    askew = turned(50) @ turned(-20)[[1, 2, 0, 3]][:, [1, 2, 0, 3]]
+    view = camera(origin=(1.0, 1.5, 2.0), rows=12, cols=16, hfov_deg=0.05)
+    return Shot((made(geometry, to_world=askew),), (DirectionalLight((-0.2, -0.5, -1.0), ONE),), view, spp=256)
+
+
+def pole(sides: int) -> Shot:
+    """Return a pole of 10 m and 2 cm, 30 m away, under the dome; 1 % of it is seen."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    ring = np.stack([0.01 * np.cos(angle), 0.01 * np.sin(angle)], axis=1)
+    vertices = np.vstack([np.column_stack([ring, np.full(sides, z)]) for z in (-5.0, 5.0)])
+    low, after = np.arange(sides), (np.arange(sides) + 1) % sides
+    faces = np.vstack([np.stack([low, after, after + sides], 1), np.stack([low, after + sides, low + sides], 1)])
+    view = camera(origin=(18.0, 24.0, 0.3), target=(0, 0, 0.3), rows=8, cols=8, hfov_deg=0.02)
+    return Shot((made(quad(vertices, faces)),), DOME, view, spp=256)
+
+
+def contact(size_m: float, tilt_deg: float = 0.0, lights: tuple[Light, ...] = DOME) -> Shot:
+    """Return a box of 10 cm on a plane, seen from 1.5 m above."""
+    tilted = turned(tilt_deg)
+    objects = (
+        made(Rectangle((size_m, size_m)), GREY, tilted, "ground"),
+        made(Cube((0.1,) * 3), GREY, tilted @ shifted(z=0.05)),
+    )
+    eye, target = tilted @ [1.5, 1.5, 1.5, 1.0], tilted @ [0.0, 0.0, 0.02, 1.0]
+    return Shot(objects, lights, camera(origin=eye[:3], target=target[:3], rows=24, cols=32, hfov_deg=8), spp=256)
+
+
+def dispersive_in_water() -> Shot:
+    """Return flint glass in water in a white furnace."""
+    shells = made(Sphere(1.0), Dielectric(1.333, 1.0), name="water"), made(Sphere(0.6), Dielectric(glass("N-SF11"), 1.333))
+    return Shot(shells, DOME, camera(rows=12, cols=16, hfov_deg=15), spp=16384, depth=256)
+
+
+def foggy(visibility_m: float, albedo: float, distance_m: float, **more) -> Shot:
+    """Return a lamp that fills the view through fog."""
+    wall = thing(Rectangle((200, 200)), 0.0, emission=Emission(ONE))
+    fog = Fog(-np.log(0.05) / visibility_m, albedo)
+    return Shot((wall,), (), camera(origin=(0, 0, distance_m), rows=12, cols=16, hfov_deg=5), fog=fog, **more)
+
+
+def fog_furnace(visibility_m: float) -> Shot:
+    """Return fog that absorbs nothing, in a furnace."""
+    fog = Fog(-np.log(0.05) / visibility_m, 1.0, 0.85, -1.0, 6.0)
+    return Shot((), DOME, camera(rows=12, cols=16, hfov_deg=5), spp=4096, depth=4096, fog=fog)
+
+
+def behind_walls() -> Shot:
+    """Return the inside of a closed grey box with all kinds of light outside."""
+    inward = mesh_of(Cube((4, 4, 4)))
+    room = made(Mesh(inward.vertices_m, inward.faces[:, ::-1]), GREY, name="room")
+    lights = (
+        PointLight((0, 0, 3), ONE),
+        SpotLight((0, 3, 0), (0, -1, 0), ONE, 20, 30),
+        DirectionalLight((1, 1, -1), ONE),
+        *DOME,
+    )
+    view = camera(origin=(0, 0.2, 0), target=(1, 0, 0.3), rows=24, cols=32, hfov_deg=90)
+    return Shot((room, lamp(Rectangle(), height_m=2.001), lamp(Sphere(), height_m=5)), lights, view, spp=256)
+
+
+def one_band(centre_nm: float) -> Shot:
+    """Return the ground in a dome, in one band of 1 nm."""
+    return Shot((ground(),), DOME, grid=WavelengthGrid(centre_nm, centre_nm, 1.0))
+
+
 # Images --------------------------------------------------------------------------------------------------------------
 
 _REPEATED = quad(faces=np.vstack([QUAD_FACES] * 3))
@@ -566,6 +677,13 @@ _IMAGES = [
     Hostile("principled of roughness 0", lambda: of(Principled(constant(1.0), 0.0), spp=4096), level=1.0),
     Hostile("principled metal of roughness 1", lambda: of(Principled(constant(1.0), 1.0, 1.0), spp=16384), level=1.0),
     Hostile("frosted glass of roughness 1", lambda: of(Dielectric(1.5, 1.0, 1.0), spp=32768), level=1.0),
+    Hostile(
+        "frosted glass of roughness 1 and index 1.0001",
+        lambda: behind(made(Sphere(), Dielectric(1.0001, 1.0, 1.0))),
+        twin=behind,
+        like="the same view without the ball",
+    ),
+    Hostile("flint glass in water", dispersive_in_water, level=1.0),
     Hostile("texture of one pixel", lambda: textured((1, 1)), twin=lambda: textured((8, 8)), like="the colour as 8 x 8 pixels"),
     Hostile("texture of one row", lambda: textured((1, 7)), twin=lambda: textured((8, 8)), like="the colour as 8 x 8 pixels"),
     Hostile("black environment image", lambda: environment(np.zeros((4, 8, 3))), level=0.0),
@@ -618,6 +736,32 @@ _IMAGES = [
         like="the lamp without them",
     ),
     Hostile(
+        "lamp that stands on the ground",
+        lambda: standing_lamp(0.0),
+        twin=lambda: standing_lamp(1e-5),
+        like="10 micrometres higher",
+    ),
+    Hostile("two squares in one place before a lamp", lambda: two_in_one_place(GREY, GREY), level=0.5),
+    Hostile("black and white square in one place", lambda: two_in_one_place(BLACK, WHITE), most=1.0),
+    Hostile("needles of aspect 1e3", lambda: on_needles(needles(1e3)), twin=lambda: on_needles(quad()), like="a square"),
+    Hostile("needles of aspect 1e5", lambda: on_needles(needles(1e5)), twin=lambda: on_needles(quad()), like="a square"),
+    Hostile("pole of 5 mm facets 10 m long, 30 m away", lambda: pole(12), level=0.5),
+    Hostile("contact on 10 km of ground", lambda: contact(1e4), twin=lambda: contact(20.0), like="on 20 m of ground"),
+    Hostile(
+        "contact on 10 km of ground in the sun",
+        lambda: contact(1e4, lights=SUN),
+        twin=lambda: contact(20.0, lights=SUN),
+        like="on 20 m of ground",
+    ),
+    Hostile("contact on 1 km of slope", lambda: contact(1e3, 30), twin=lambda: contact(20.0, 30), like="on 20 m of slope"),
+    Hostile(
+        "contact on 10 km of slope",
+        lambda: contact(1e4, 30),
+        twin=lambda: contact(20.0, 30),
+        like="on 20 m of slope",
+        tolerance=SLOPE_TOLERANCE,
+    ),
+    Hostile(
         "flat triangles in a mesh",
         lambda: under(quad(faces=DEGENERATE)),
         twin=lambda: under(quad()),
@@ -645,7 +789,7 @@ _IMAGES = [
     Hostile(
         "plate of a micrometre", lambda: under(Cube((2, 2, 1e-6))), twin=lambda: under(Rectangle((2, 2))), like="a rectangle"
     ),
-    Hostile("scene of 1 nm", lambda: scaled(1e-9), twin=lambda: scaled(1.0), like="the scene in metres"),
+    Hostile("scene of 0.1 micrometres", lambda: scaled(1e-7), twin=lambda: scaled(1.0), like="the scene in metres"),
     Hostile("micrometre scene", lambda: scaled(1e-6), twin=lambda: scaled(1.0), like="the scene in metres"),
     Hostile(
         "micrometre scene with a ball",
@@ -673,9 +817,39 @@ _IMAGES = [
     Hostile("film of 1 x 20000", lambda: film(1, 20_000), level=0.5, may_kill=True),
     Hostile("film of 20000 x 1", lambda: film(20_000, 1), level=0.5, may_kill=True),
     Hostile("2000 point lights", lambda: point_lights(2000), level=lambert(3.0, 2.0), may_kill=True),
+    Hostile("10,000 point lights", lambda: point_lights(10_000), level=lambert(3.0, 2.0), may_kill=True),
+    Hostile(
+        "2000 lamps of 1e-9 W beside one of 1e12 W",
+        lambda: point_lights_each([1e-9 / (4 * np.pi)] * 2000 + [1e12 / (4 * np.pi)]),
+        level=lambert(1e12 / (4 * np.pi), 2.0),
+    ),
+    Hostile(
+        "2000 lamps of 1e-9 W above one of 1e12 W", faint_above_a_bright_one, level=lambert(2000 * 1e-9 / (4 * np.pi), 2.0)
+    ),
+    Hostile("all lights behind walls", behind_walls, level=0.0),
+    Hostile(
+        "dome of no light and a lamp",
+        lambda: lit(ConstantEnvironment(constant(0.0)), PointLight((0, 0, 2), ONE), spp=256),
+        level=lambert(1.0, 2.0),
+    ),
+    Hostile("one band of 1 nm at 380 nm", lambda: one_band(380.0), level=0.5),
+    Hostile("one band of 1 nm at 1000 nm", lambda: one_band(1000.0), level=0.5),
+    Hostile("paths of one segment", lambda: Shot((ground(),), DOME, depth=1), level=0.0),
+    Hostile("paths of 1000 segments", lambda: box(0.5, 1000, spp=4096), level=2.0),
+    Hostile("fog of 1 m that absorbs", lambda: foggy(1.0, 0.0, 0.2, spp=32768), level=0.05**0.2),
+    Hostile("fog of 1 m that only scatters, in a furnace", lambda: fog_furnace(1.0), level=1.0),
+    Hostile("fog of 1000 km", lambda: foggy(1e6, 0.999, 5.0), level=1.0),
     Hostile(
         "2000 lamps with a surface",
         lambda: lit_by(*split_lamp(50, 40), spp=256),
+        twin=lambda: lit_by(*split_lamp(1, 1), spp=256),
+        tolerance=SPLIT_TOLERANCE,
+        may_kill=True,
+        like="the same lamp in one piece",
+    ),
+    Hostile(
+        "10,000 lamps with a surface",
+        lambda: lit_by(*split_lamp(100, 100), spp=256),
         twin=lambda: lit_by(*split_lamp(1, 1), spp=256),
         tolerance=SPLIT_TOLERANCE,
         may_kill=True,

@@ -33,8 +33,8 @@ RAY_OFFSET = 1.5e-6
 CURVED_OFFSET = 3e-6
 """The same off curved shapes, times the coordinates of their centre and their diameter together."""
 
-_SMALLEST_REACH_M = 1e-8
-"""Scenes of a hundredth of this are still right; at a thousandth, squares of distances leave single precision."""
+_SMALLEST_REACH_M = 1e-6
+"""Scenes of a thirtieth of this are still right; below, the products of coordinates by which triangles are traced underflow."""
 
 
 def collect_surfaces(scene: SceneDescription, centre_m: NDArray[np.float64]) -> SceneSurfaces:

@@ -62,7 +62,8 @@ class Geometry:
         self._mi, self._dr = mi, dr
         self.surfaces = surfaces
         self.tables: Tables = {}
-        contents: dict[str, Any] = {"type": "scene"}
+        # Else the plane of a needle, a wire say, is off by its aspect times the rounding, and it shadows itself.
+        contents: dict[str, Any] = {"type": "scene", "embree_use_robust_intersections": True}
         features = set()
         if len(surfaces.faces):
             features.add("mesh")
