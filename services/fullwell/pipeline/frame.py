@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib.metadata
 import time
+from collections import OrderedDict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fullwell.core.errors import CancelledError, ConflictError, NotFoundError
-from fullwell.core.hashing import sha256_hex
+from fullwell.core.hashing import digest_of, sha256_hex
 from fullwell.core.rng import seed32, stream
 from fullwell.dataset import encode
 from fullwell.dataset.dng import check_dng_pattern, encode_raw_dng
@@ -29,7 +30,7 @@ from fullwell.pipeline.plan import FramePlan, plan_document, plan_frame
 from fullwell.pipeline.progress import CancelCheck, FrameProgress, ProgressCallback
 from fullwell.pipeline.stage_store import StageStore
 from fullwell.render import RenderedLight, choose_variant, query_depth, query_surfaces, render_light, tile_errors
-from fullwell.scene import Camera, Film
+from fullwell.scene import Camera, Film, SceneDescription
 from fullwell.scene.images import OpticalImage, RawImage
 from fullwell.schema.frame import CameraRig, FrameDescription, SensorRig
 from fullwell.sensor import ChannelCurrents, SensorModel
@@ -354,11 +355,29 @@ def _sensor_products(
             _add(run, f"{folder}image.png", lambda: encode.encode_rgb_png(rgb))
     if run.plan.labels:
         with run.stage(f"{rig.camera.name}/{sensor.name}: labels"):
-            hits = query_surfaces(run.frame.scene, view, should_cancel=run.should_cancel)
-            labels = make_labels(run.frame.scene, view, hits)
+            labels = _labels(run, view)
         run.instance_table = labels.instance_table
         _label_products(run, labels, view, folder)
     return document
+
+
+_kept_labels: OrderedDict[str, tuple[SceneDescription, Labels]] = OrderedDict()
+"""Labels of the last views of a scene: frames that vary only sensor noise, exposure or picture have the same."""
+
+_MOST_KEPT_LABELS = 4
+
+
+def _labels(run: _Run, view: Camera) -> Labels:
+    scene = run.frame.scene
+    key = digest_of([view.camera_to_world, view.tangent_pitch, view.film.rows, view.film.cols, view.lens.kind])
+    kept = _kept_labels.pop(key, None)
+    if kept is None or kept[0] is not scene:  # descriptions are never changed: the same object is the same scene
+        hits = query_surfaces(scene, view, should_cancel=run.should_cancel)
+        kept = (scene, make_labels(scene, view, hits))
+    _kept_labels[key] = kept
+    while len(_kept_labels) > _MOST_KEPT_LABELS:
+        _kept_labels.popitem(last=False)
+    return kept[1]
 
 
 def _sensor_view(camera: Camera, model: SensorModel) -> Camera:

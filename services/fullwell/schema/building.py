@@ -18,6 +18,7 @@ from fullwell.schema.v1.recipe import QualityDocument, RecipeDocument
 from fullwell.schema.variation import extreme_values, frame_values
 
 if TYPE_CHECKING:
+    from fullwell.radiometry.grid import WavelengthGrid
     from fullwell.scene import Film
     from fullwell.schema.conversion.context import AssetReader, Context, RecipeFiles
     from fullwell.schema.conversion.scenes import PlacedScene
@@ -82,6 +83,7 @@ class RecipeBuilder:
         self._base_dir = document.base_dir if base_dir is None else base_dir
         self._asset_reader = asset_reader
         self._files: RecipeFiles | None = None
+        self._last_scene: tuple[bytes, PlacedScene, Context] | None = None
         self._views: list[tuple[tuple[Film, View], ...]] | None = None
 
     def frame(self, index: int) -> FrameDescription:
@@ -119,7 +121,6 @@ class RecipeBuilder:
         from fullwell.radiometry.grid import WavelengthGrid  # noqa: PLC0415
         from fullwell.schema.conversion.cameras import camera_rig  # noqa: PLC0415
         from fullwell.schema.conversion.context import Context, RecipeFiles  # noqa: PLC0415
-        from fullwell.schema.conversion.scenes import scene_of  # noqa: PLC0415
         from fullwell.schema.frame import FrameDescription  # noqa: PLC0415
 
         if self._files is None:
@@ -131,12 +132,13 @@ class RecipeBuilder:
         cameras = tuple(
             camera_rig(camera, f"cameras[{i}]", recipe.quality.oversampling, context) for i, camera in enumerate(recipe.cameras)
         )
-        placed = scene_of(recipe.scene, context)
+        plain = recipe.plain()
+        placed, of_scene = self._placed(recipe, plain, grid)
         _check_light_groups(recipe, placed)
         if self._views is None:
             self._views = self._shared_views(context)
         _check_cameras_outside(cameras, placed)
-        plain = recipe.plain() | {"files": dict(sorted(context.used_files.items()))}
+        plain |= {"files": dict(sorted((of_scene.used_files | context.used_files).items()))}
         return FrameDescription(
             recipe_name=recipe.name,
             seed=recipe.seed,
@@ -148,11 +150,24 @@ class RecipeBuilder:
             grid=grid,
             outputs=tuple(recipe.outputs),
             quality=_quality(recipe.quality),
-            warnings=context.all_warnings(),
+            warnings=tuple(dict.fromkeys((*context.all_warnings(), *of_scene.all_warnings()))),
             recipe_json=canonical_json(plain).decode(),
             group_weights=tuple(sorted(recipe.scene.light_groups.items())),
             views=_views_on(self._views, cameras, tuple(sorted(recipe.scene.light_groups.items()))),
         )
+
+    def _placed(self, recipe: RecipeDocument, plain: dict[str, Any], grid: WavelengthGrid) -> tuple[PlacedScene, Context]:
+        """Return the scene, the very object of the frame before where it is the same: what was loaded of it is used again."""
+        from fullwell.schema.conversion.context import Context  # noqa: PLC0415
+        from fullwell.schema.conversion.scenes import scene_of  # noqa: PLC0415
+
+        assert self._files is not None
+        scene = {name: value for name, value in plain["scene"].items() if name != "light_groups"}
+        key = canonical_json({"scene": scene, "spectral": plain.get("spectral"), "files": plain.get("files")})
+        if self._last_scene is None or self._last_scene[0] != key:
+            context = Context(grid, self._files)
+            self._last_scene = (key, scene_of(recipe.scene, context), context)
+        return self._last_scene[1:]
 
     def _shared_views(self, context: Context) -> list[tuple[tuple[Film, View], ...]]:
         """Return the views that frames of the recipe have, for each camera with the film it is on; none if `vary` changes none.

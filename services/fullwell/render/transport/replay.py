@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Hashable
 from typing import Any
 
@@ -45,10 +46,15 @@ def replayed(kind: Hashable, function: Callable[..., Any], scene: Any, arrays: l
         known = _recordings[kind] = (dr.freeze(record, warn_after=_MANY_RECORDINGS), recorded)
     frozen, of_kind = known
     of_kind.function = function
+    # A collection in the middle of a recording would free arrays of earlier scenes, which Dr.Jit cannot record: it aborts.
+    collecting = gc.isenabled()
+    gc.disable()
     try:
         return frozen(scene, arrays, *arguments)
     finally:
         of_kind.function = None
+        if collecting:
+            gc.enable()
 
 
 def device_arrays(*objects: Any) -> list[Any]:
