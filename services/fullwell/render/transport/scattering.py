@@ -208,6 +208,10 @@ class Surface:
             base = self._dr.lerp(base, repeated, self._metallic)
         return base
 
+    def _mean(self, spectral: Any) -> Any:
+        """Return the mean over a path's wavelengths. Dr.Jit's own along an axis writes the number of lanes into the code."""
+        return self._dr.sum(spectral) * (1.0 / self._count)
+
     def _body(self) -> Any:
         """Return the light a coated body sends up again inside, of the light that has entered."""
         return self.colour / (1.0 - self.colour * self._inner) if self._plastic else self.colour
@@ -232,7 +236,7 @@ class Surface:
     def _facet_share(self, mu: Any) -> Any:
         """Return the probability of the microfacet lobe: its share of the albedo, by the mean over the wavelengths."""
         dr = self._dr
-        wide = dr.mean(self._body(), axis=0)
+        wide = self._mean(self._body())
         narrow: Any = self._mi.Float(0.0)
         if self._plastic:
             entering = self._coat(mu)
@@ -240,8 +244,8 @@ class Surface:
             narrow = 1.0 - entering
         if self._metal:
             albedo = self._albedo_at(self._metal_row, mu)
-            repeated = (1.0 - albedo) * dr.mean(self.colour * self._repeated(), axis=0)
-            once = albedo * dr.mean(self.colour, axis=0)
+            repeated = (1.0 - albedo) * self._mean(self.colour * self._repeated())
+            once = albedo * self._mean(self.colour)
             wide = dr.lerp(wide, repeated * self._metal_wide, self._metallic)
             narrow = dr.lerp(narrow, once + repeated * (1.0 - self._metal_wide), self._metallic)
         return dr.select(narrow > 0, narrow / dr.maximum(narrow + wide, 1e-20), 0.0)

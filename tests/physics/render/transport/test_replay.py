@@ -72,6 +72,9 @@ def mi() -> Any:
     return module
 
 
+LOOP_OPERATIONS = 1000
+"""The path loop has more, everything else fewer."""
+
 CASES = [(3, 5.0, (9, 12)), (6, 1.0, (12, 16)), (2, 700.0, (9, 12)), (5, 0.01, (7, 31))]
 
 
@@ -93,3 +96,5 @@ def test_another_scene_of_a_kind_compiles_nothing(mi: Any) -> None:
         launched = [kernel for kernel in dr.kernel_history() if kernel["type"] == dr.KernelType.JIT]
     assert len(launched) >= 3 * len(CASES)
     assert all(kernel["cache_hit"] for kernel in launched)
+    # From the cache on disk it would be a hit as well: one code for all scenes and all numbers of lanes.
+    assert len({kernel["hash"] for kernel in launched if kernel["operation_count"] > LOOP_OPERATIONS}) == 1
