@@ -9,6 +9,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
 
 __all__ = ["NoiseTarget", "Sampler", "SamplingGoal", "SamplingOutcome", "TileErrors", "Views", "sample_until", "tile_errors"]
 
@@ -23,6 +24,13 @@ _GROWTH = 4.0
 
 _SAFETY = 1.05
 """More samples than the error at hand asks for, so that one round is mostly enough."""
+
+
+_AROUND = 5
+"""Side of a tile's surroundings, in tiles."""
+
+_PRIOR_SAMPLES = 64
+"""Samples per pixel at which a tile's own variance counts as much as that of its surroundings."""
 
 
 class NoiseTarget(Protocol):
@@ -196,7 +204,7 @@ def sample_until(
     while True:
         errors = tile_errors(image.replicas(), views)
         so_far = image.counts.reshape(image.rows, image.cols)[::TILE, ::TILE]
-        more = _more_samples(errors.ratio, so_far, goal.noise_ratio, cap)
+        more = _more_samples(_cautious(errors.ratio, so_far * replicas), so_far, goal.noise_ratio, cap)
         late = goal.time_limit_s is not None and time.perf_counter() - started > goal.time_limit_s
         if late or not more.any():
             unmet = int(np.count_nonzero(errors.ratio > goal.noise_ratio))
@@ -214,6 +222,20 @@ def _set_clamp(image: Sampler, saturation: float, views: Views, everything: NDAr
     mean = image.replicas().astype(np.float64).mean(axis=0)
     limits = [target.saturation(np.tensordot(weights, mean, axes=(0, 0))) for weights, target in views]
     image.restart(saturation * np.max(limits, axis=0))
+
+
+def _cautious(ratio: NDArray[np.float64], samples: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the error over noise by which tiles are judged: their own, or with few samples that of their surroundings too.
+
+    Where rare paths are bright, a tile that has met none yet looks exact. Variances for one sample, in units of the sensor's
+    noise, are averaged with those of the tiles around, half and half at `_PRIOR_SAMPLES` and soon less with more.
+    """
+    for_one = np.where(np.isfinite(ratio), ratio, 0.0) ** 2 * samples
+    # Running sums may fall below zero by rounding.
+    around = np.maximum(uniform_filter(for_one, size=_AROUND, mode="nearest"), 0.0)
+    own = samples**2 / (samples**2 + _PRIOR_SAMPLES**2)
+    together = (own * for_one + (1.0 - own) * around) / np.maximum(samples, 1)
+    return np.maximum(ratio, np.sqrt(together))
 
 
 def _more_samples(ratio: NDArray[np.float64], so_far: NDArray[np.int64], wanted: float, cap: int) -> NDArray[np.int64]:
