@@ -235,7 +235,7 @@ def _cautious(ratio: NDArray[np.float64], samples: NDArray[np.int64]) -> NDArray
     around = np.maximum(uniform_filter(for_one, size=_AROUND, mode="nearest"), 0.0)
     own = samples**2 / (samples**2 + _PRIOR_SAMPLES**2)
     together = (own * for_one + (1.0 - own) * around) / np.maximum(samples, 1)
-    return np.maximum(ratio, np.sqrt(together))
+    return np.asarray(np.maximum(ratio, np.sqrt(together)))
 
 
 def _more_samples(ratio: NDArray[np.float64], so_far: NDArray[np.int64], wanted: float, cap: int) -> NDArray[np.int64]:
