@@ -6,7 +6,8 @@ Cycles is a development tool here, no dependency: Blender is under the GPL and l
 
 and name its interpreter in FULLWELL_BENCH_BPY (default ~/bpy-venv/bin/python). Then
 python -m benchmarks.cycles [--scene NAME] [--size 160x120] [--samples 64] [--reference-seconds 40]
-prints for each scene the CPU-seconds that Cycles and Mitsuba need for the same relative error of the luminance.
+prints for each scene the CPU-seconds that Cycles (RGB) and the path loop (31 bands, equal samples) need for the same relative
+error of the luminance.
 
 What is not the same: three colours instead of spectra, so colours of light after several bounces; the sun and sky are a sampled
 image and a disc; rough plastic and metals are Blender's Principled BSDF. Each renderer is compared with its own long run, so
@@ -27,9 +28,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.baselines import MitsubaPath
 from benchmarks.engines import Budget, Engine, Result, Stopwatch
 from benchmarks.measures import luminance, luminance_relative_mse
+from benchmarks.path_engines import OwnPath
 from benchmarks.references import extend_reference
 from benchmarks.scenes import SCENES, build_frame
 from fullwell.radiometry import Spectrum, illuminant, normal_reflectance, tristimulus
@@ -354,10 +355,10 @@ def main() -> None:
             frame = build_frame(scene, Path(folder), size=(cols, rows))
         told = [
             _efficiency(engine, frame, arguments.samples, arguments.reference_seconds)
-            for engine in (CyclesEngine(), MitsubaPath())
+            for engine in (CyclesEngine(), OwnPath("uniform", skip=False, adaptive=False))
         ]
-        ratios = {f"cpu_cycles_over_mitsuba_at_equal_{e}": _ratio(told, e) for e in ("relmse", "trimmed_relmse")}
-        print(json.dumps({"scene": scene, **ratios, "cycles": told[0], "mitsuba": told[1]}), flush=True)
+        ratios = {f"cpu_cycles_over_fullwell_at_equal_{e}": _ratio(told, e) for e in ("relmse", "trimmed_relmse")}
+        print(json.dumps({"scene": scene, **ratios, "cycles": told[0], "fullwell": told[1]}), flush=True)
 
 
 def _ratio(told: list[dict[str, Any]], error: str) -> float:
