@@ -97,7 +97,8 @@ def test_sun_in_a_mirror_stops_at_the_cap_and_says_which_tiles_are_noisy() -> No
     assert 1 <= statistics.unmet_tiles <= 4
     assert statistics.tiles == 12
     assert statistics.samples_max == CAP
-    assert statistics.samples_min == FIRST_ROUND
+    # All tiles are near the sun's: they get more than the first round, until they stand for themselves.
+    assert FIRST_ROUND < statistics.samples_min < CAP
     assert statistics.noise_ratio_max > 0.5
 
 
