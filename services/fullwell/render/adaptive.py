@@ -105,8 +105,7 @@ class SamplingGoal:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TileErrors:
-    """Error over noise by tile: `ratio` (tile rows, tile cols), of the worst channel; `error` and `noise` variances pooled
-    over tiles and channels give `rms`."""
+    """Error over noise by tile: `ratio` (tile rows, tile cols), of the worst view and channel; `rms` over tiles."""
 
     ratio: NDArray[np.float64]
     rms: float
