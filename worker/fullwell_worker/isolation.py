@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -11,7 +12,7 @@ import structlog
 from fullwell.core import FullwellError, RenderError
 from fullwell_worker.limits import RenderLimits, resident_bytes
 from fullwell_worker.messages import FrameFailed, FrameFinished, FrameOrder
-from fullwell_worker.render_process import RenderProcess, memory_error
+from fullwell_worker.render_process import OrderNotTakenError, RenderProcess, memory_error
 from fullwell_worker.runners import Progress
 
 if TYPE_CHECKING:
@@ -85,11 +86,9 @@ class IsolatedRunner:
         Exception
             What the runner raised in the render process, as the same class.
         """
-        child = self._living_child()
-        self._serial += 1
         order = FrameOrder(
-            serial=self._serial,
-            document=None if self._document is document else document,
+            serial=0,
+            document=document,
             index=index,
             store_url=self._store_url,
             prefix=prefix,
@@ -97,13 +96,30 @@ class IsolatedRunner:
             log_fields=structlog.contextvars.get_contextvars(),
         )
         try:
+            answer, child = self._made(order, progress, should_cancel)
+        except OrderNotTakenError as idle:
+            log.warning("render process died while idle", cause=str(idle))
+            answer, child = self._made(order, progress, should_cancel)  # of a new process every end is the frame's
+        self._document = document
+        return self._taken(answer, child)
+
+    def _made(
+        self,
+        order: FrameOrder,
+        progress: Callable[[Progress], None] | None,
+        should_cancel: Callable[[], bool] | None,
+    ) -> tuple[FrameFinished | FrameFailed, RenderProcess]:
+        child = self._living_child()
+        self._serial += 1
+        kept = self._document is not None and self._document is order.document
+        order = replace(order, serial=self._serial, document=None if kept else order.document)
+        try:
             answer = child.make(order, progress, should_cancel)
         except BaseException:
             self._forget_child()  # it is dead, or must not go on with a frame that nobody waits for
             child.kill()
             raise
-        self._document = document
-        return self._taken(answer, child)
+        return answer, child
 
     def close(self) -> None:
         """End the render process, if there is one."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 if TYPE_CHECKING:
     from fullwell.schema import RecipeDocument
 
-__all__ = ["Answer", "CancelOrder", "FrameFailed", "FrameFinished", "FrameOrder", "Order", "StageReport"]
+__all__ = ["Answer", "CancelOrder", "FrameFailed", "FrameFinished", "FrameOrder", "Order", "OrderTaken", "StageReport"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +45,13 @@ class CancelOrder:
 
 
 @dataclass(frozen=True, slots=True)
+class OrderTaken:
+    """The process has the order: if it ends from now on, the frame may be the reason."""
+
+    serial: int
+
+
+@dataclass(frozen=True, slots=True)
 class StageReport:
     """Where the frame is: stage, and the finished share of the frame in [0, 1]."""
 
@@ -68,4 +75,4 @@ class FrameFailed:
 
 
 Order: TypeAlias = FrameOrder | CancelOrder
-Answer: TypeAlias = StageReport | FrameFinished | FrameFailed
+Answer: TypeAlias = OrderTaken | StageReport | FrameFinished | FrameFailed

@@ -26,7 +26,7 @@ import structlog
 from fullwell.jobs.children import die_with_parent
 from fullwell.jobs.logs import configure_logs
 from fullwell.storage import store_from_url
-from fullwell_worker.messages import Answer, CancelOrder, FrameFailed, FrameFinished, FrameOrder, StageReport
+from fullwell_worker.messages import Answer, CancelOrder, FrameFailed, FrameFinished, FrameOrder, OrderTaken, StageReport
 
 if TYPE_CHECKING:
     from fullwell.schema import RecipeDocument
@@ -106,6 +106,7 @@ class _Kitchen:
 
     def serve(self, order: FrameOrder) -> None:
         with structlog.contextvars.bound_contextvars(**order.log_fields):
+            self._desk.answer(OrderTaken(order.serial))
             self._desk.answer(self._made(order))
 
     def _made(self, order: FrameOrder) -> Answer:

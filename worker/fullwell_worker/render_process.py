@@ -18,14 +18,18 @@ from typing import IO, Final
 
 from fullwell.core import CancelledError, RenderMemoryError, RenderProcessError, RenderTimeError
 from fullwell_worker.limits import GIB, RenderLimits, resident_bytes
-from fullwell_worker.messages import Answer, CancelOrder, FrameFailed, FrameFinished, FrameOrder, Order, StageReport
+from fullwell_worker.messages import Answer, CancelOrder, FrameFailed, FrameFinished, FrameOrder, Order, OrderTaken, StageReport
 from fullwell_worker.runners import Progress
 
-__all__ = ["RenderProcess", "memory_error"]
+__all__ = ["OrderNotTakenError", "RenderProcess", "memory_error"]
 
 LOOK_S: Final = 0.1
 """Pause between two looks at size, time and cancellation. A process fills a few hundred MB in it."""
 END_PATIENCE_S: Final = 5.0
+
+
+class OrderNotTakenError(Exception):
+    """The process ended before it had the order: the frame was not the reason, and can be given to another process."""
 
 
 class RenderProcess:
@@ -62,16 +66,23 @@ class RenderProcess:
         progress: Callable[[Progress], None] | None,
         should_cancel: Callable[[], bool] | None,
     ) -> FrameFinished | FrameFailed:
-        """Return how the frame ended; raise what ended the process instead."""
+        """Return how the frame ended; raise what ended the process instead.
+
+        Raises `OrderNotTakenError` where the process had made frames before and ended while it had none: that may show only
+        now, since a process that is being ended answers to nothing for a while and is no zombie yet.
+        """
         self.frames += 1
         self._at = StageReport("start", 0.0)
         self._words.clear()
-        frame = _FrameWatch(self._limits, self.frames - 1)
+        frame, taken = _FrameWatch(self._limits, self.frames - 1), False
         try:
             self._connection.send(order)
             while True:
                 if self._connection.poll(LOOK_S):
                     answer = self._connection.recv()
+                    taken = True
+                    if isinstance(answer, OrderTaken):
+                        continue
                     if not isinstance(answer, StageReport):
                         self._at = None
                         return answer
@@ -82,7 +93,10 @@ class RenderProcess:
                 if should_cancel is not None and should_cancel() and frame.cancel():
                     self._connection.send(CancelOrder(order.serial))
         except (EOFError, OSError, pickle.UnpicklingError):
-            raise RenderProcessError(self.cause_of_death()) from None
+            cause = self.cause_of_death()
+            if not taken and self.frames > 1:
+                raise OrderNotTakenError(cause) from None
+            raise RenderProcessError(cause) from None
 
     def has_ended(self) -> bool:
         """Return whether the process has ended. Leaves it a zombie: its number stays its own until `kill`."""

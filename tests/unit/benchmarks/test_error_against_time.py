@@ -140,13 +140,13 @@ def test_a_costlier_run_that_happens_to_be_worse_takes_the_cheaper_ones_luck_awa
     assert cost_at_error([1.0, 2.0, 8.0], [1.0, 2.0, 1.0], 1.9) == pytest.approx(cost_at_error([2.0, 8.0], [2.0, 1.0], 1.9))
 
 
-def test_ratios_are_made_within_a_seed_at_the_smallest_error_that_both_reach() -> None:
+def test_ratios_are_made_of_the_same_seeds_at_the_smallest_error_that_both_reach() -> None:
     def curve(slowness: list[float], ratios: bool) -> list[dict[str, Any]]:
         return [
             {
                 "seed": seed,
                 "cpu_s": slow / error**2,
-                "rms": error,
+                "tile_squares": [[error**2, error**2 / 4], [0.0, error**2 / 2]],
                 "noise_ratio": error if ratios else None,
                 "samples": error**-2,
             }
@@ -154,8 +154,19 @@ def test_ratios_are_made_within_a_seed_at_the_smallest_error_that_both_reach() -
             for error in (1.0, 2.0, 4.0)
         ]
 
-    found = error_against_time.paired_ratio(curve([3.0, 8.0, 5.0], False), curve([1.0, 2.0, 1.0], True), "rms")
-    assert found == pytest.approx((1.0, 4.0, 3.0, 5.0), rel=EXACT)
+    found = error_against_time.paired_ratio(curve([3.0, 8.0, 5.0], False), curve([1.0, 2.0, 1.0], True), "worst")
+    assert found == pytest.approx((1.0, 4.0, 11 / 3, 13 / 3), rel=EXACT)
+
+
+def test_the_worst_tile_is_that_of_the_expectation_not_of_a_run() -> None:
+    runs = [
+        {"seed": 0, "cpu_s": 1.0, "noise_ratio": None, "samples": 16, "tile_squares": [[100.0, 1.0], [1.0, 1.0]]},
+        {"seed": 1, "cpu_s": 3.0, "noise_ratio": None, "samples": 16, "tile_squares": [[0.0, 1.0], [1.0, 1.0]]},
+    ]
+    assert error_against_time.pooled(runs, [0, 1]) == [
+        (2.0, {"rms": pytest.approx((51 / 2) ** 0.5), "p95": pytest.approx(1 + 0.95 * (50**0.5 - 1)), "worst": 50**0.5})
+    ]
+    assert error_against_time.pooled(runs, [0, 1, 2]) == []
 
 
 # What outlives a run -------------------------------------------------------------------------------------------------

@@ -32,6 +32,7 @@ from fullwell.storage import LocalStore
 from fullwell_worker.execution import PERMANENT, PipelineRunner, runner_of
 from fullwell_worker.isolation import IsolatedRunner
 from fullwell_worker.limits import RenderLimits, limits_of, resident_bytes
+from fullwell_worker.render_process import RenderProcess
 
 MIB = 1 << 20
 ROOMY = RenderLimits(memory_bytes=4096 * MIB, recycle_bytes=2048 * MIB, time_s=60.0, max_frames=50)
@@ -141,6 +142,24 @@ def test_a_process_that_dies_while_idle_fails_nothing(isolated: Callable[..., Is
     assert one.make()["frames"] == 1
 
 
+def test_a_death_that_shows_only_when_the_frame_is_sent_fails_nothing(
+    isolated: Callable[..., Isolated], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # A process that is being ended is no zombie yet: the look before the frame finds it alive.
+    one = isolated()
+    pid = one.make()["pid"]
+    with monkeypatch.context() as patch:
+        patch.setattr(IsolatedRunner, "_living_child", lambda self: self._child or RenderProcess(*living_arguments(self)))
+        os.kill(pid, signal.SIGKILL)
+        wait_until(lambda: not is_alive(pid))
+        again = one.make()
+    assert (again["frames"], again["pid"] != pid, again["name"]) == (1, True, "first")
+
+
+def living_arguments(runner: Any) -> tuple[Any, ...]:
+    return runner._limits, runner._runner, runner._environment
+
+
 def test_a_frame_that_grows_beyond_the_limit_is_ended(isolated: Callable[..., Isolated]) -> None:
     one = isolated(memory_bytes=640 * MIB)
     with pytest.raises(RenderMemoryError, match=r"needed more than 0\.62 GiB.*FULLWELL_RENDER_MEMORY_BYTES") as caught:
@@ -226,6 +245,7 @@ import sys
 from pathlib import Path
 from types import SimpleNamespace
 from fullwell_worker.isolation import IsolatedRunner
+from fullwell_worker.render_process import RenderProcess
 from fullwell_worker.limits import RenderLimits
 runner = IsolatedRunner(Path(sys.argv[2]).as_uri(), RenderLimits(1 << 32, 1 << 31, 60.0, 50), runner="render_standins:Standin",
                         environment={"PYTHONPATH": sys.argv[1]})
