@@ -1,0 +1,1 @@
+"""The starter library: assets that this project's own parametric generators make."""
