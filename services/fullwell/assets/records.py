@@ -136,7 +136,7 @@ class PartRecord:
 
 @dataclass(frozen=True, slots=True)
 class LevelRecord:
-    """One level of detail: a GLB file (metres, y up as glTF demands) in the store. `error_m` is what simplifying may have cost."""
+    """One level of detail: a GLB file (metres, y up as glTF demands). `error_m` is what simplifying may have cost."""
 
     triangles: int
     sha256: str
