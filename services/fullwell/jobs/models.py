@@ -5,7 +5,7 @@ from __future__ import annotations
 from sqlalchemy import BigInteger, Float, ForeignKey, Index, Integer, MetaData, String, Text
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
-__all__ = ["AttemptRow", "Base", "FrameRow", "JobRow", "WorkerRow"]
+__all__ = ["AttemptRow", "Base", "FrameRow", "IngestionRow", "JobRow", "WorkerRow"]
 
 _NAMES = {
     "ix": "ix_%(table_name)s_%(column_0_N_name)s",
@@ -103,3 +103,43 @@ class WorkerRow(Base):
     started_at: Mapped[float] = mapped_column(Float)
     seen_at: Mapped[float] = mapped_column(Float)
     leaving_at: Mapped[float | None] = mapped_column(Float)
+
+
+class IngestionRow(Base):
+    """Work on one asset: reading uploaded files into the store, or rendering previews again; and the lease on it.
+
+    `asset_id`, `asset_version` and `checks_json` are set as soon as the asset is in the store: a later attempt renders
+    previews only. `preview_error` is empty where they are there.
+    """
+
+    __tablename__ = "ingestions"
+    __table_args__ = (Index("ix_ingestions_state_enqueued_at", "state", "enqueued_at"),)
+
+    id: Mapped[str] = mapped_column(String(32), primary_key=True)
+    kind: Mapped[str] = mapped_column(String(16))
+    name: Mapped[str] = mapped_column(String(200))
+    who: Mapped[str] = mapped_column(String(64))
+    state: Mapped[str] = mapped_column(String(16))
+    priority: Mapped[int] = mapped_column(Integer)
+    request_json: Mapped[str] = mapped_column(Text)
+    request_sha256: Mapped[str] = mapped_column(String(64))
+    idempotency_key: Mapped[str | None] = mapped_column(String(255), unique=True)
+    attempt: Mapped[int] = mapped_column(Integer, default=0)
+    strikes: Mapped[int] = mapped_column(Integer, default=0)
+    enqueued_at: Mapped[float | None] = mapped_column(Float)
+    not_before: Mapped[float] = mapped_column(Float, default=0.0)
+    created_at: Mapped[float] = mapped_column(Float)
+    started_at: Mapped[float | None] = mapped_column(Float)
+    finished_at: Mapped[float | None] = mapped_column(Float)
+    worker: Mapped[str | None] = mapped_column(String(255))
+    holder: Mapped[str | None] = mapped_column(Text)
+    lease_token: Mapped[str | None] = mapped_column(String(32))
+    lease_expires_at: Mapped[float | None] = mapped_column(Float)
+    stage: Mapped[str] = mapped_column(String(64), default="")
+    fraction: Mapped[float] = mapped_column(Float, default=0.0)
+    error: Mapped[str | None] = mapped_column(Text)
+    error_code: Mapped[str | None] = mapped_column(String(64))
+    asset_id: Mapped[str | None] = mapped_column(String(80), index=True)
+    asset_version: Mapped[int | None] = mapped_column(Integer)
+    checks_json: Mapped[str] = mapped_column(Text, default="[]")
+    preview_error: Mapped[str] = mapped_column(Text, default="")
