@@ -66,7 +66,7 @@ def make_services(settings: Settings, *, queue: TaskQueue | None = None, store: 
     ServiceError
         No broker is set, or the service would be open to other machines without a key.
     """
-    if not (settings.api_keys or settings.is_loopback or settings.allow_open):
+    if not (settings.has_keys or settings.is_loopback or settings.allow_open):
         raise ServiceError(
             f"the service would be open to everyone who can reach {settings.host}. Set FULLWELL_API_KEYS, "
             "or FULLWELL_ALLOW_OPEN=1 if that is meant."

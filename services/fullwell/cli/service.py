@@ -43,7 +43,7 @@ def serve(
     from fullwell.jobs.supervisor import serve as run_service
 
     settings = load_settings(host=host, port=port, workers=workers, home=home)
-    if not (settings.api_keys or settings.is_loopback or settings.allow_open):
+    if not (settings.has_keys or settings.is_loopback or settings.allow_open):
         raise FieldError(
             f"host is {settings.host!r}: the service would be open to everyone who can reach it. "
             "Set FULLWELL_API_KEYS, or FULLWELL_ALLOW_OPEN=1 if that is meant.",

@@ -3,17 +3,44 @@
 from __future__ import annotations
 
 import os
+import re
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 from pydantic import Field, SecretStr, ValidationError, field_validator, model_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from fullwell.core.errors import FieldError
 
-__all__ = ["Settings", "default_home", "load_settings"]
+__all__ = ["CuratorKey", "Settings", "default_home", "load_settings"]
 
 MIB = 1 << 20
+GIB = 1 << 30
+LEAST_KEY_CHARACTERS: Final = 8
+CURATOR: Final = "curator"
+"""Name of a curator whose key was set without one."""
+
+_CURATOR_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._@-]{0,63}")
+
+
+@dataclass(frozen=True, slots=True)
+class CuratorKey:
+    """A key that may change assets, and the name under which its decisions are recorded: never the key itself."""
+
+    name: str
+    key: SecretStr
+
+    @classmethod
+    def from_text(cls, text: str) -> CuratorKey:
+        """Return the key of ``name:key``, or of ``key`` alone; ValueError for an illegal name or a short key."""
+        name, colon, key = text.partition(":")
+        name, key = (name.strip(), key) if colon else (CURATOR, text)
+        if not _CURATOR_NAME.fullmatch(name):
+            raise ValueError("a curator's name must be 1 to 64 letters, digits, dots, dashes, underscores or @; write name:key")
+        if len(key) < LEAST_KEY_CHARACTERS:
+            raise ValueError(f"a curator key must have at least {LEAST_KEY_CHARACTERS} characters; write name:key")
+        return cls(name, SecretStr(key))
 
 
 def default_home() -> Path:
@@ -41,12 +68,18 @@ class Settings(BaseSettings):
     port: int = Field(default=8000, ge=0, le=65535)
     workers: int = Field(default=1, ge=0, le=256)
     api_keys: Annotated[tuple[SecretStr, ...], NoDecode] = ()
+    curator_keys: Annotated[tuple[CuratorKey, ...], NoDecode] = ()
     allow_open: bool = False
     allowed_hosts: Annotated[tuple[str, ...], NoDecode] = ()
     presign_products: bool = False
     max_request_bytes: int = Field(default=8 * MIB, ge=1024)
     max_blob_bytes: int = Field(default=2048 * MIB, ge=1024)
     max_frames_per_job: int = Field(default=100_000, ge=1)
+    max_upload_bytes: int = Field(default=2048 * MIB, ge=1024)
+
+    ingest_time_limit_s: float = Field(default=120.0, ge=1.0, le=3000.0)
+    ingest_memory_bytes: int = Field(default=3 * GIB, ge=512 * MIB)
+    preview_on_ingest: bool = True
 
     cache_bytes: int = Field(default=8192 * MIB, ge=0)
 
@@ -76,6 +109,13 @@ class Settings(BaseSettings):
     def _split_commas(cls, value: Any) -> Any:
         return tuple(part.strip() for part in value.split(",") if part.strip()) if isinstance(value, str) else value
 
+    @field_validator("curator_keys", mode="before")
+    @classmethod
+    def _named_keys(cls, value: Any) -> Any:
+        if not isinstance(value, str):
+            return value
+        return tuple(CuratorKey.from_text(part.strip()) for part in value.split(",") if part.strip())
+
     @field_validator("home", mode="after")
     @classmethod
     def _absolute_home(cls, value: Path) -> Path:
@@ -84,8 +124,8 @@ class Settings(BaseSettings):
     @field_validator("api_keys", mode="after")
     @classmethod
     def _long_keys(cls, value: tuple[SecretStr, ...]) -> tuple[SecretStr, ...]:
-        if any(len(key.get_secret_value()) < 8 for key in value):
-            raise ValueError("an API key must have at least 8 characters")
+        if any(len(key.get_secret_value()) < LEAST_KEY_CHARACTERS for key in value):
+            raise ValueError(f"an API key must have at least {LEAST_KEY_CHARACTERS} characters")
         return value
 
     @field_validator("render_memory_bytes", mode="after")
@@ -122,6 +162,11 @@ class Settings(BaseSettings):
     def client_url(self) -> str:
         """Where commands look for the service."""
         return self.url or f"http://{self.host if self.host not in ('0.0.0.0', '::') else '127.0.0.1'}:{self.port}"
+
+    @property
+    def has_keys(self) -> bool:
+        """Whether requests need a key."""
+        return bool(self.api_keys or self.curator_keys)
 
     @property
     def is_loopback(self) -> bool:
