@@ -148,7 +148,7 @@ def _rig(manifest: dict[str, Any], camera_number: int, sensor_number: int) -> Se
 
     bands = manifest["wavelengths_nm"]
     document = load_recipe(manifest["recipe"])
-    context = Context(WavelengthGrid(bands["first"], bands["last"], bands["step"]), RecipeFiles(None, None, {}, confined=True))
+    context = Context(WavelengthGrid(bands["first"], bands["last"], bands["step"]), RecipeFiles(None, {}, confined=True))
     rig = camera_rig(document.cameras[camera_number], f"cameras[{camera_number}]", 1, context)
     return rig.sensors[sensor_number]
 

@@ -20,7 +20,7 @@ __all__ = [
     "relative_path",
 ]
 
-RESOLVED_PREFIXES: Final = ("asset:", "sumo:")
+RESOLVED_PREFIXES: Final = ("sumo:",)
 """References that the service resolves from its own library; they name no file of the recipe's folder."""
 MAX_FILES: Final = 10_000
 MAX_PATH_CHARACTERS: Final = 500

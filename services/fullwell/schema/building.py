@@ -6,6 +6,7 @@ import itertools
 import json
 import math
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,11 +21,12 @@ from fullwell.schema.variation import extreme_values, frame_values
 if TYPE_CHECKING:
     from fullwell.radiometry.grid import WavelengthGrid
     from fullwell.scene import Film
-    from fullwell.schema.conversion.context import AssetReader, Context, RecipeFiles
+    from fullwell.schema.assets import AssetSource
+    from fullwell.schema.conversion.context import Context, RecipeFiles
     from fullwell.schema.conversion.scenes import PlacedScene
     from fullwell.schema.frame import CameraRig, FrameDescription, Quality, View
 
-__all__ = ["RecipeBuilder", "build_frame", "frame_document", "validate"]
+__all__ = ["RecipeBuilder", "build_frame", "frame_document", "validate", "varied_document"]
 
 _BUILT_VALUES = 200
 """Varied values that `validate` builds completely; the others are read and checked against the document's ranges."""
@@ -37,33 +39,32 @@ DEFAULT_NOISE_RATIO = 0.5
 
 
 def build_frame(
-    document: RecipeDocument, index: int = 0, *, base_dir: Path | None = None, asset_reader: AssetReader | None = None
+    document: RecipeDocument, index: int = 0, *, base_dir: Path | None = None, assets: AssetSource | None = None
 ) -> FrameDescription:
     """Return frame `index` of a recipe, resolved and checked.
 
     `base_dir` is the folder of its files (default: that of the recipe's file; a recipe that was not read from there may name
-    only files within it), `asset_reader` finds "asset:" references.
+    only files within it), `assets` is the store that assets are drawn from.
     For many frames of one recipe make one `RecipeBuilder`, which keeps the models it read. Raises RecipeError.
     """
-    return RecipeBuilder(document, base_dir=base_dir, asset_reader=asset_reader).frame(index)
+    return RecipeBuilder(document, base_dir=base_dir, assets=assets).frame(index)
 
 
-def validate(
-    document: RecipeDocument, *, base_dir: Path | None = None, asset_reader: AssetReader | None = None
-) -> tuple[str, ...]:
+def validate(document: RecipeDocument, *, base_dir: Path | None = None, assets: AssetSource | None = None) -> tuple[str, ...]:
     """Return the warnings of a recipe after building its first frame and checking every value that `vary` can set.
 
     Nothing is rendered. Raises RecipeError for the first thing that is wrong.
     """
-    return RecipeBuilder(document, base_dir=base_dir, asset_reader=asset_reader).validate()
+    return RecipeBuilder(document, base_dir=base_dir, assets=assets).validate()
 
 
 def frame_document(document: RecipeDocument, index: int) -> RecipeDocument:
     """Return the recipe of one frame, with `vary` applied and removed."""
-    return _varied_document(document, frame_values(document, index))
+    return varied_document(document, frame_values(document, index))
 
 
-def _varied_document(document: RecipeDocument, values: dict[str, Any]) -> RecipeDocument:
+def varied_document(document: RecipeDocument, values: dict[str, Any]) -> RecipeDocument:
+    """Return the recipe with `values` at their paths, and without `vary`."""
     plain = document.plain()
     plain.pop("vary", None)
     return document_of(with_values(plain, values), base_dir=document.base_dir) if values else _without_vary(document)
@@ -76,12 +77,10 @@ def _without_vary(document: RecipeDocument) -> RecipeDocument:
 class RecipeBuilder:
     """Builds the frames of one recipe; model files and digests are kept between frames."""
 
-    def __init__(
-        self, document: RecipeDocument, *, base_dir: Path | None = None, asset_reader: AssetReader | None = None
-    ) -> None:
+    def __init__(self, document: RecipeDocument, *, base_dir: Path | None = None, assets: AssetSource | None = None) -> None:
         self._document = document
         self._base_dir = document.base_dir if base_dir is None else base_dir
-        self._asset_reader = asset_reader
+        self._assets = assets
         self._files: RecipeFiles | None = None
         self._last_scene: tuple[bytes, PlacedScene, Context] | None = None
         self._views: list[tuple[tuple[Film, View], ...]] | None = None
@@ -90,7 +89,7 @@ class RecipeBuilder:
         """Return frame `index`, resolved and checked. Raises RecipeError, or FieldError where there is no such frame."""
         values = frame_values(self._document, index)
         try:
-            return self._build(_varied_document(self._document, values), values, index)
+            return self._build(varied_document(self._document, values), values, index)
         except RecipeError as error:
             if not values:
                 raise
@@ -109,7 +108,7 @@ class RecipeBuilder:
             if number >= _READ_VALUES:
                 break
             try:
-                changed = _varied_document(self._document, {**values, path: value})
+                changed = varied_document(self._document, {**values, path: value})
                 if number < _BUILT_VALUES:
                     _check_renderable(self._build(changed, values, 0))
             except RecipeError as error:
@@ -126,7 +125,7 @@ class RecipeBuilder:
         if self._files is None:
             # The owner of a recipe file may name any file; a recipe from elsewhere only those of the folder it is given.
             confined = self._base_dir != self._document.base_dir
-            self._files = RecipeFiles(self._base_dir, self._asset_reader, self._document.files, confined=confined)
+            self._files = RecipeFiles(self._base_dir, self._document.files, confined=confined)
         grid = WavelengthGrid(recipe.spectral.first_nm, recipe.spectral.last_nm, recipe.spectral.step_nm)
         context = Context(grid, self._files)
         cameras = tuple(
@@ -138,6 +137,7 @@ class RecipeBuilder:
         if self._views is None:
             self._views = self._shared_views(context)
         _check_cameras_outside(cameras, placed)
+        _name_drawn(plain, of_scene.drawn_assets)
         plain |= {"files": dict(sorted((of_scene.used_files | context.used_files).items()))}
         return FrameDescription(
             recipe_name=recipe.name,
@@ -163,9 +163,12 @@ class RecipeBuilder:
 
         assert self._files is not None
         scene = {name: value for name, value in plain["scene"].items() if name != "light_groups"}
-        key = canonical_json({"scene": scene, "spectral": plain.get("spectral"), "files": plain.get("files")})
+        contents = {"scene": scene, "spectral": plain.get("spectral"), "files": plain.get("files")}
+        if any(_asset_geometries(scene)):  # drawn by the seed, among the pins
+            contents |= {"seed": recipe.seed, "assets": plain.get("assets")}
+        key = canonical_json(contents)
         if self._last_scene is None or self._last_scene[0] != key:
-            context = Context(grid, self._files)
+            context = Context(grid, self._files, self._assets, recipe, recipe.seed)
             self._last_scene = (key, scene_of(recipe.scene, context), context)
         return self._last_scene[1:]
 
@@ -191,13 +194,33 @@ class RecipeBuilder:
             changes = [{path: value} for path, values in extremes.items() for value in values][:_MOST_VIEWS]
         found: dict[str, tuple[tuple[Film, View], ...]] = {}
         for change in changes:
-            recipe = _varied_document(self._document, base | change)
+            recipe = varied_document(self._document, base | change)
             weights = tuple(sorted(recipe.scene.light_groups.items()))
             rigs = [camera_rig(c, f"cameras[{i}]", recipe.quality.oversampling, context) for i, c in enumerate(recipe.cameras)]
             views = tuple((rig.camera.film, View(rig.sensors, weights)) for rig in rigs)
             looks = [[film, [[s.model, s.exposure] for s in view.sensors]] for film, view in views]
             found.setdefault(digest_of([looks, weights]), views)
         return list(found.values())
+
+
+def _asset_geometries(scene: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield (path, geometry) of each asset in a scene of plain data."""
+    for index, item in enumerate(scene["objects"]):
+        path = f"scene.objects[{index}]"
+        parts = enumerate(item.get("parts", []))
+        places = [(f"{path}.geometry", item), *((f"{path}.parts[{number}].geometry", part) for number, part in parts)]
+        for where, holder in places:
+            if holder.get("geometry", {}).get("kind") == "asset":
+                yield where, holder["geometry"]
+
+
+def _name_drawn(plain: dict[str, Any], drawn: dict[str, str]) -> None:
+    """Replace draws by what was drawn: a frame's recipe names each asset, and makes the same scene without any catalogue."""
+    for path, geometry in _asset_geometries(plain["scene"]):
+        kept = {name: geometry[name] for name in ("kind", "level", "lit") if name in geometry}
+        geometry.clear()
+        geometry.update(kept | {"id": drawn[path]})
+    plain["assets"] = {}
 
 
 def _views_on(

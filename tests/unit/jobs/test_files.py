@@ -74,7 +74,7 @@ def test_a_file_that_was_not_submitted_is_named() -> None:
 
 
 def test_a_reference_into_the_services_library_needs_no_file_and_cannot_climb() -> None:
-    check_references({"file": "asset:fullwell/car@1"}, {})
+    check_references({"file": "sumo:car"}, {})
     with pytest.raises(FieldError):
         check_references({"file": "sumo:../../etc/passwd"}, {})
 

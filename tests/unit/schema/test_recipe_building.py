@@ -299,18 +299,6 @@ def test_files_are_recorded_by_digest_and_a_changed_one_is_refused(with_model: d
         build_frame(stored, base_dir=tmp_path)
 
 
-def test_assets_come_from_the_reader(with_model: dict[str, Any], tmp_path: Path) -> None:
-    with_model["scene"]["objects"][0]["geometry"]["file"] = "asset:thing"
-    asked: list[str] = []
-
-    def reader(reference: str) -> Path:
-        asked.append(reference)
-        return tmp_path / "shape.obj"
-
-    build_frame(load_recipe(with_model), asset_reader=reader)
-    assert asked == ["thing"]
-
-
 @pytest.mark.parametrize("by_link", [False, True])
 def test_a_recipe_from_elsewhere_reads_nothing_outside_its_folder(
     with_model: dict[str, Any], tmp_path: Path, by_link: bool

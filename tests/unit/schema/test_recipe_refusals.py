@@ -92,7 +92,7 @@ CASES: list[tuple[str, Any, str, str]] = [
         "is nan",
     ),
     (f"{BALL}.geometry", {"kind": "model", "file": "car.glb"}, "scene.objects[0].geometry.file", "no folder"),
-    (f"{BALL}.geometry", {"kind": "model", "file": "asset:car"}, "scene.objects[0].geometry.file", "no asset store"),
+    (f"{BALL}.geometry", {"kind": "model", "file": "asset:car"}, "scene.objects[0].geometry.file", "kind: asset, id: car"),
     (f"{BALL}.transform", {}, "scene.objects[0].transform", "is empty"),
     (f"{BALL}.transform", {"scale": 0}, "scene.objects[0].transform.scale", "must be > 0"),
     (f"{BALL}.transform", {"scale": [1, 1, 1e-8]}, "scene.objects[0].transform", "singular"),

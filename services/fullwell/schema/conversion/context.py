@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import posixpath
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,13 +19,11 @@ from fullwell.schema.errors import RecipeError
 
 if TYPE_CHECKING:
     from fullwell.assets.model import LoadedModel
+    from fullwell.schema.assets import AssetSource
+    from fullwell.schema.v1.recipe import RecipeDocument
 
-__all__ = ["AssetReader", "Context", "RecipeFiles", "fail", "located"]
+__all__ = ["Context", "RecipeFiles", "fail", "located"]
 
-AssetReader = Callable[[str], Path]
-"""Turns the reference behind "asset:" into a local file; raises a FullwellError where it cannot."""
-
-ASSET_PREFIX = "asset:"
 PACKAGED_PREFIX = "sumo:"
 _KEPT_MODELS = 64
 """Models kept between the frames of one recipe; more are read again, so that memory does not grow without bound."""
@@ -56,12 +54,9 @@ class RecipeFiles:
     With `confined`, files and what they refer to must stay within `base_dir`, links followed.
     """
 
-    def __init__(
-        self, base_dir: Path | None, asset_reader: AssetReader | None, expected: dict[str, str], *, confined: bool
-    ) -> None:
+    def __init__(self, base_dir: Path | None, expected: dict[str, str], *, confined: bool) -> None:
         self._base_dir = base_dir
         self._confined = confined
-        self._asset_reader = asset_reader
         self._expected = expected
         self._licences: dict[str, str] = {}
         self._digests: dict[tuple[str, int, int], str] = {}
@@ -79,16 +74,15 @@ class RecipeFiles:
         return file, self._digest(file, reference, path)
 
     def _local(self, reference: str, path: str) -> Path:
-        if reference.startswith(ASSET_PREFIX):
-            if self._asset_reader is None:
-                fail(path, f"is {reference!r}, but no asset store is at hand here; give a file.", reference)
-            return self._asset_reader(reference.removeprefix(ASSET_PREFIX))
         if reference.startswith(PACKAGED_PREFIX):
             from fullwell.assets import packaged_model  # noqa: PLC0415 - an extra
 
             packaged = packaged_model(reference, field_path=path)
             self._licences[reference] = f"{packaged.licence} ({packaged.source})"
             return packaged.path
+        if reference.startswith("asset:"):
+            name = reference.removeprefix("asset:")
+            fail(path, f"is {reference!r}, which is no file; write geometry: {{kind: asset, id: {name}}}.", reference)
         if self._base_dir is None:
             fail(path, f"is {reference!r}, but this recipe has no folder; load it from a file, or use an asset.", reference)
         file = self._base_dir / reference
@@ -110,7 +104,7 @@ class RecipeFiles:
         return digest
 
     def licence(self, reference: str) -> str | None:
-        """Return the licence and source of a file that was found in a package or an asset store; None for the user's own."""
+        """Return the licence and source of a file that was found in a package; None for the user's own."""
         return self._licences.get(reference)
 
     def companions(self, reference: str, file: Path, model: LoadedModel) -> dict[str, str]:
@@ -149,13 +143,32 @@ class RecipeFiles:
                 )
         return self._models[key]
 
+    def level(self, file: Path, digest: str, *, path: str) -> LoadedModel:
+        """Return a level of detail of an asset, read once per digest."""
+        from fullwell.assets.ingest.canonical import read_level  # noqa: PLC0415 - reading models is an extra
+
+        key = (digest, "level", None, None)
+        if key not in self._models:
+            if len(self._models) >= _KEPT_MODELS:
+                self._models.pop(next(iter(self._models)))
+            with located(path):
+                self._models[key] = read_level(file)
+        return self._models[key]
+
 
 @dataclass(slots=True)
 class Context:
-    """State of the conversion of one frame."""
+    """State of the conversion of one frame.
+
+    `document` and `seed` are what assets are drawn by; `drawn_assets` notes {path of a geometry: pin}.
+    """
 
     grid: WavelengthGrid
     files: RecipeFiles
+    assets: AssetSource | None = None
+    document: RecipeDocument | None = None
+    seed: int = 0
+    drawn_assets: dict[str, str] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     used_files: dict[str, str] = field(default_factory=dict)
     materials: dict[str, tuple[Material, Emission | None]] = field(default_factory=dict)

@@ -19,6 +19,7 @@ from fullwell.scene import (
     RoughPlastic,
     Texture,
 )
+from fullwell.schema.conversion.assets import catalogue_material, is_catalogue_name
 from fullwell.schema.conversion.context import Context, fail, located
 from fullwell.schema.conversion.spectra import absolute, colour_of, luminous, reflectance_of
 from fullwell.schema.v1 import materials as documents
@@ -36,6 +37,8 @@ _SMALLEST_ROUGHNESS = 0.01
 def material_of(reference: Any, named: Mapping[str, Any], path: str, context: Context) -> tuple[Material, Emission | None]:
     """Return the material of a name in ``scene.materials`` or of one written in place, with its emission."""
     if isinstance(reference, str):
+        if reference not in named and is_catalogue_name(reference):
+            return catalogue_material(reference, path, context)
         if reference not in named:
             fail(path, f"names no entry of scene.materials: {_unknown(reference, named)}", reference)
         path, reference = f"scene.materials.{reference}", named[reference]

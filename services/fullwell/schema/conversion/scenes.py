@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
@@ -25,16 +25,17 @@ from fullwell.scene import (
     SceneObject,
     SunSky,
 )
+from fullwell.schema.conversion.assets import DrawnAsset, asset_part_material, check_lit, draw_asset
 from fullwell.schema.conversion.context import Context, fail
 from fullwell.schema.conversion.geometry import geometry_of, transform_of
 from fullwell.schema.conversion.lights import area_light_object, light_of
 from fullwell.schema.conversion.materials import material_of, model_material
-from fullwell.schema.v1.geometry import ModelGeometry
+from fullwell.schema.v1.geometry import AssetGeometry, ModelGeometry
 from fullwell.schema.v1.lights import AreaLight
 from fullwell.schema.v1.recipe import FogDocument, ObjectDocument, PartDocument, SceneDocument
 
 if TYPE_CHECKING:
-    from fullwell.assets.model import LoadedPart
+    from fullwell.assets.model import LoadedModel, LoadedPart
 
 __all__ = ["PlacedScene", "scene_of"]
 
@@ -112,6 +113,7 @@ class _Surface:
     to_object: NDArray[np.float64]
     name: str
     path: str
+    asset: DrawnAsset | None = None
 
 
 def _object(document: ObjectDocument, named: Mapping[str, Any], path: str, context: Context) -> SceneObject:
@@ -119,16 +121,30 @@ def _object(document: ObjectDocument, named: Mapping[str, Any], path: str, conte
         surfaces = [_Surface(document.geometry, document.material, document.materials, np.eye(4), "", path)]
     else:
         surfaces = [_surface_of(item, f"{path}.parts[{number}]") for number, item in enumerate(document.parts)]
+    surfaces = [_with_asset(surface, document.id, context) for surface in surfaces]
     parts = tuple(part for surface in surfaces for part in _parts(surface, named, context))
     to_world = transform_of(document.transform, f"{path}.transform")
     licences = (*document.licences, *_model_licences(surfaces, context))
-    return SceneObject(document.id, document.semantic_class, parts, to_world, tuple(dict.fromkeys(licences)))
+    kinds = [surface.asset.manifest.asset_class for surface in surfaces if surface.asset is not None]
+    semantic_class = document.semantic_class or (kinds[0] if kinds else "")
+    return SceneObject(document.id, semantic_class, parts, to_world, tuple(dict.fromkeys(licences)))
+
+
+def _with_asset(surface: _Surface, object_id: str, context: Context) -> _Surface:
+    if not isinstance(surface.geometry, AssetGeometry):
+        return surface
+    path = f"{surface.path}.geometry"
+    drawn = draw_asset(surface.geometry, object_id, path, context)
+    check_lit(drawn, tuple(surface.geometry.lit), path)
+    return replace(surface, asset=drawn)
 
 
 def _model_licences(surfaces: Iterable[_Surface], context: Context) -> Iterator[str]:
     for surface in surfaces:
         if isinstance(surface.geometry, ModelGeometry) and (licence := context.files.licence(surface.geometry.file)):
             yield licence
+        if surface.asset is not None:
+            yield surface.asset.licence
 
 
 def _surface_of(document: PartDocument, path: str) -> _Surface:
@@ -137,6 +153,8 @@ def _surface_of(document: PartDocument, path: str) -> _Surface:
 
 
 def _parts(surface: _Surface, named: Mapping[str, Any], context: Context) -> list[Part]:
+    if surface.asset is not None:
+        return _placed(surface, surface.asset.model, named, context)
     if isinstance(surface.geometry, ModelGeometry):
         return _model_parts(surface, surface.geometry, named, context)
     if surface.materials:
@@ -156,6 +174,10 @@ def _model_parts(surface: _Surface, geometry: ModelGeometry, named: Mapping[str,
     context.used_files |= context.files.companions(geometry.file, file, model)
     for warning in model.warnings:
         context.warn(f"{file_path}: {warning}")
+    return _placed(surface, model, named, context)
+
+
+def _placed(surface: _Surface, model: LoadedModel, named: Mapping[str, Any], context: Context) -> list[Part]:
     _check_patterns(surface, [part.name for part in model.parts])
     prefix = f"{surface.name}/" if surface.name else ""
     parts = []
@@ -181,4 +203,7 @@ def _loaded_material(
             return material_of(reference, named, f'{surface.path}.materials."{pattern}"', context)
     if surface.material is not None:
         return material_of(surface.material, named, f"{surface.path}.material", context)
+    if surface.asset is not None:
+        lit = tuple(surface.geometry.lit)
+        return asset_part_material(surface.asset, loaded, lit, f"{surface.path}.geometry", context)
     return model_material(loaded, f"{surface.path}.geometry.file", context), None

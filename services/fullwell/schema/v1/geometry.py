@@ -11,6 +11,7 @@ from fullwell.schema.v1.common import (
     Document,
     Length,
     MatrixRows,
+    NonNegative,
     Number,
     Point,
     Range,
@@ -24,6 +25,7 @@ from fullwell.schema.v1.common import (
 
 __all__ = [
     "AreaGeometry",
+    "AssetGeometry",
     "CubeGeometry",
     "CylinderGeometry",
     "DiskGeometry",
@@ -103,7 +105,7 @@ class MeshGeometry(Document):
 
 
 class ModelGeometry(Document):
-    """A model file (GLB, glTF, OBJ, PLY, STL, USD), relative to the recipe, or "asset:<reference>".
+    """A model file (GLB, glTF, OBJ, PLY, STL, USD), relative to the recipe, or "sumo:<name>".
 
     `unit_m` is the length of one unit of the file [m] and `up_axis` its upward axis, where the file does not say.
     """
@@ -114,6 +116,42 @@ class ModelGeometry(Document):
     up_axis: Literal["x", "y", "z"] | None = None
 
 
+_Span = tuple[NonNegative | None, NonNegative | None]
+
+
+class AssetGeometry(Document):
+    """A model of the asset store, drawn by the recipe's seed and the object's id among those that meet all conditions.
+
+    `id` names one asset, or pins one version as "<id>@<digest>". Only approved assets are drawn unless `state` says otherwise.
+    Sizes are [least, most], either null. `weights` gives assets by id, or by a tag they have, more or less chance than 1;
+    factors multiply. `level` is the level of detail, 0 the finest. Parts whose names match a pattern of `lit` emit, as their
+    lamp does.
+    """
+
+    kind: Literal["asset"]
+    id: Text | None = None
+    asset_class: Text | None = Field(default=None, alias="class")
+    tags: list[Text] = Field(default_factory=list, max_length=32)
+    without_tags: list[Text] = Field(default_factory=list, max_length=32)
+    licence: list[Text] = Field(default_factory=list, max_length=32)
+    state: list[Literal["pending", "approved", "rejected"]] = Field(default=["approved"], min_length=1)
+    text: Text | None = None
+    length_m: _Span | None = None
+    width_m: _Span | None = None
+    height_m: _Span | None = None
+    weights: dict[str, Annotated[float, Range(ge=0)]] = Field(default_factory=dict, max_length=1000)
+    level: Annotated[int, Range(ge=0, le=16, whole=True)] = 0
+    lit: list[Text] = Field(default_factory=list, max_length=64)
+
+    @model_validator(mode="after")
+    def _pin_stands_alone(self) -> AssetGeometry:
+        conditions = ("asset_class", "tags", "without_tags", "licence", "text", "length_m", "width_m", "height_m", "weights")
+        if self.id is not None and "@" in self.id and (given := next((key for key in conditions if getattr(self, key)), None)):
+            name = "class" if given == "asset_class" else given
+            refuse(f"is given together with a pinned id, {self.id!r}; remove one of them.", name)
+        return self
+
+
 GeometryDocument = Annotated[
     SphereGeometry
     | RectangleGeometry
@@ -122,7 +160,8 @@ GeometryDocument = Annotated[
     | CylinderGeometry
     | QuadGeometry
     | MeshGeometry
-    | ModelGeometry,
+    | ModelGeometry
+    | AssetGeometry,
     Field(discriminator="kind"),
 ]
 AreaGeometry = Annotated[

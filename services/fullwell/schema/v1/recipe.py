@@ -247,6 +247,11 @@ class RecipeDocument(Document):
     vary: VaryDocument | None = None
     files: dict[str, _Digest] = Field(default_factory=dict)
     """SHA-256 of files by their path in the recipe; a file that differs is refused."""
+    assets: dict[str, list[str]] = Field(default_factory=dict)
+    """Pins: the assets ("<id>@<digest>") that each draw chooses among, by the canonical text of its conditions.
+
+    A service writes them when a job is submitted: what its curators do later changes no frame of the job.
+    """
 
     _base_dir: Path | None = PrivateAttr(default=None)
 
