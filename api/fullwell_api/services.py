@@ -12,6 +12,7 @@ from fullwell.core import FullwellError, ServiceError
 from fullwell.core.settings import Settings
 from fullwell.jobs.database import Database
 from fullwell.jobs.dispatcher import Dispatcher, DispatcherTiming
+from fullwell.jobs.ingestions import IngestionRepository
 from fullwell.jobs.queue import CeleryTaskQueue, TaskQueue
 from fullwell.jobs.records import RetryRule
 from fullwell.jobs.repository import JobRepository
@@ -30,6 +31,7 @@ class Services:
     settings: Settings
     database: Database
     repository: JobRepository
+    ingestions: IngestionRepository
     queue: TaskQueue
     store: ObjectStore
     dispatcher: Dispatcher
@@ -77,11 +79,21 @@ def make_services(settings: Settings, *, queue: TaskQueue | None = None, store: 
         queue = CeleryTaskQueue(settings, settings.broker_url)
     database = Database(settings.database)
     repository = JobRepository(database)
+    ingestions = IngestionRepository(database)
     timing = DispatcherTiming(interval_s=settings.reap_interval_s, lost_after_s=settings.lease_s)
     rule = RetryRule(settings.max_attempts, settings.retry_delay_s)
-    dispatcher = Dispatcher(repository, queue, rule=rule, timing=timing)
+    dispatcher = Dispatcher(repository, queue, ingestions=ingestions, rule=rule, timing=timing)
     threads = ThreadPoolExecutor(max_workers=16, thread_name_prefix="service")
-    return Services(settings, database, repository, queue, store or store_from_url(settings.store), dispatcher, threads)
+    return Services(
+        settings=settings,
+        database=database,
+        repository=repository,
+        ingestions=ingestions,
+        queue=queue,
+        store=store or store_from_url(settings.store),
+        dispatcher=dispatcher,
+        threads=threads,
+    )
 
 
 def _services(request: Request) -> Services:

@@ -8,7 +8,7 @@ import socket
 import subprocess
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -24,11 +24,13 @@ from fullwell.core import FullwellError, ServiceError
 from fullwell.core.settings import Settings
 from fullwell.jobs.children import die_with_parent
 from fullwell.jobs.database import Database
-from fullwell.jobs.queue import RENDER_TASK, CeleryTaskQueue, TaskQueue, celery_application
+from fullwell.jobs.ingestions import IngestionRepository
+from fullwell.jobs.queue import INGEST_TASK, RENDER_TASK, CeleryTaskQueue, TaskQueue, celery_application
 from fullwell.jobs.repository import JobRepository
 from fullwell.storage import store_from_url
 from fullwell_worker import health
 from fullwell_worker.execution import CurrentJob, WorkerContext, run_frames, runner_of
+from fullwell_worker.ingesting import AssetContext, asset_context, run_ingestion
 from fullwell_worker.loss import Loss, record_loss_in_a_process
 from fullwell_worker.watchdog import Watchdog
 
@@ -58,6 +60,7 @@ class _Processes:
         self._flags = mmap.mmap(-1, 3)
         self._pid = 0
         self._context: WorkerContext | None = None
+        self._assets: AssetContext | None = None
 
     @property
     def leaving(self) -> bool:
@@ -93,8 +96,17 @@ class _Processes:
             repository = JobRepository(Database(self.settings.database))
             store = store_from_url(self.settings.store)
             self._context = WorkerContext(self.name, self.settings, repository, store, CurrentJob(), runner_of(self.settings))
+            self._assets = None
             self._pid = os.getpid()
         return self._context
+
+    def assets(self) -> AssetContext:
+        """The context of work on assets; previews are rendered by the same render process as frames."""
+        context = self.context()
+        if self._assets is None:
+            database = Database(self.settings.database)
+            self._assets = asset_context(self.name, self.settings, database, context.store, context.runner)
+        return self._assets
 
 
 class QueueWorker:
@@ -124,6 +136,7 @@ class QueueWorker:
         try:
             repository = self._processes.context().repository
             repository.release_worker(self._processes.name, cause=SHUT_DOWN)
+            IngestionRepository(Database(self._processes.settings.database)).release_worker(self._processes.name)
             repository.remove_worker(self._processes.name)
         except FullwellError as error:
             log.warning("not signed off", cause=str(error))
@@ -177,17 +190,30 @@ def _add_task(application: Celery, processes: _Processes) -> None:
     @application.task(name=RENDER_TASK, base=FrameTask, bind=True)  # type: ignore[untyped-decorator]
     def render_frames(self: Any, job_id: str, numbers: list[int]) -> None:
         """Run frames of a job; the database says which of them still need it."""
-        try:
-            with processes.working():
-                frames = [int(number) for number in numbers]
-                run_frames(processes.context(), str(job_id), frames, should_stop=lambda: processes.leaving)
-        except ServiceError as error:
-            # The database is away: the message goes back to the broker, after a pause, and comes again.
-            log.warning("message handed back", job=job_id, cause=str(error))
-            time.sleep(BEAT_S)
-            raise Reject(str(error), requeue=True) from error
-        except FullwellError as error:
-            log.warning("message dropped", job=job_id, cause=str(error))
+        with _message(processes, job=job_id):
+            frames = [int(number) for number in numbers]
+            run_frames(processes.context(), str(job_id), frames, should_stop=lambda: processes.leaving)
+
+    @application.task(name=INGEST_TASK, base=FrameTask, bind=True)  # type: ignore[untyped-decorator]
+    def ingest_asset(self: Any, ingestion_id: str) -> None:
+        """Read uploaded files into the asset store and render previews; the database says whether that is still needed."""
+        with _message(processes, ingestion=ingestion_id):
+            run_ingestion(processes.assets(), str(ingestion_id))
+
+
+@contextmanager
+def _message(processes: _Processes, **fields: object) -> Iterator[None]:
+    """Answer the message by how its work ended."""
+    try:
+        with processes.working():
+            yield
+    except ServiceError as error:
+        # The database is away: the message goes back to the broker, after a pause, and comes again.
+        log.warning("message handed back", cause=str(error), **fields)
+        time.sleep(BEAT_S)
+        raise Reject(str(error), requeue=True) from error
+    except FullwellError as error:
+        log.warning("message dropped", cause=str(error), **fields)
 
 
 def _answer(answer: Callable[..., object], *arguments: object) -> None:
@@ -207,11 +233,17 @@ def _record_loss(processes: _Processes, request: Any, cause: str) -> None:
     if processes.leaving or getattr(request, "_already_cancelled", False):
         return  # an orderly end: the frames are given back when the last child has ended
     try:
-        job_id, numbers = request.args
-        record_loss_in_a_process(Loss(str(job_id), tuple(numbers), processes.name, cause))
+        record_loss_in_a_process(_loss_of(request.args, processes.name, cause))
     except (OSError, subprocess.SubprocessError, ValueError, TypeError) as error:
         # The dispatcher finds the dead holder itself, a few seconds later, if without this cause.
         log.warning("loss not recorded", cause=str(error))
+
+
+def _loss_of(arguments: Sequence[Any], worker: str, cause: str) -> Loss:
+    if len(arguments) == 1:
+        return Loss(worker, cause, ingestion_id=str(arguments[0]))
+    job_id, numbers = arguments
+    return Loss(worker, cause, job_id=str(job_id), numbers=tuple(numbers))
 
 
 def _add_handlers(processes: _Processes, queue: TaskQueue) -> None:

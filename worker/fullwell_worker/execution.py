@@ -6,7 +6,7 @@ import contextlib
 import json
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -40,6 +40,7 @@ __all__ = [
     "PipelineRunner",
     "WorkerContext",
     "frame_prefix",
+    "patiently",
     "run_frames",
     "runner_of",
 ]
@@ -98,12 +99,20 @@ class WorkerContext:
 
 
 class Heart:
-    """A thread that prolongs the lease while a frame runs, reports its progress, and learns that it should stop."""
+    """A thread that prolongs a lease while its work runs, reports its progress, and learns that it should stop.
 
-    def __init__(self, repository: JobRepository, lease: Lease, *, lease_s: float) -> None:
-        self._repository = repository
-        self._lease = lease
+    Parameters
+    ----------
+    prolong
+        Takes stage and fraction to the database; returns whether the work is still wanted of this worker.
+    fields
+        What the log says of a beat that failed.
+    """
+
+    def __init__(self, prolong: Callable[[str, float], bool], *, lease_s: float, fields: Mapping[str, object]) -> None:
+        self._prolong = prolong
         self._lease_s = lease_s
+        self._fields = dict(fields)
         self._progress = ("", 0.0)
         self._stop_asked = threading.Event()
         self._ended = threading.Event()
@@ -111,7 +120,11 @@ class Heart:
 
     def report(self, progress: Progress) -> None:
         """Take a FrameProgress; it goes to the database with the next beat."""
-        self._progress = (progress.stage, min(1.0, max(0.0, progress.fraction)))
+        self.report_stage(progress.stage, progress.fraction)
+
+    def report_stage(self, stage: str, fraction: float) -> None:
+        """Take the stage that runs and the finished share of the whole in [0, 1]."""
+        self._progress = (stage, min(1.0, max(0.0, fraction)))
 
     def should_cancel(self) -> bool:
         """Return whether the job was cancelled or the lease was lost; cheap, to be asked between passes."""
@@ -128,14 +141,13 @@ class Heart:
     def _beat(self) -> None:
         interval_s = min(MAX_BEAT_S, self._lease_s / 4)
         while not self._ended.wait(interval_s):
-            stage, fraction = self._progress
             try:
-                beat = self._repository.heartbeat(self._lease, lease_s=self._lease_s, stage=stage, fraction=fraction)
+                wanted = self._prolong(*self._progress)
             except ServiceError as error:
                 # Not a reason to stop: should the lease end meanwhile, whoever is first to publish wins.
-                log.warning("heartbeat failed", job=self._lease.job_id, frame=self._lease.number, cause=str(error))
+                log.warning("heartbeat failed", cause=str(error), **self._fields)
                 continue
-            if beat.cancel_requested or not beat.still_held:
+            if not wanted:
                 self._stop_asked.set()
 
 
@@ -167,8 +179,14 @@ def run_frames(
 def _run_leased(context: WorkerContext, lease: Lease) -> None:
     started = time.monotonic()
     log.info("frame started")
-    repository = context.repository
-    with Heart(repository, lease, lease_s=context.settings.lease_s) as heart, _outcome(context, lease, heart):
+    repository, lease_s = context.repository, context.settings.lease_s
+
+    def prolong(stage: str, fraction: float) -> bool:
+        beat = repository.heartbeat(lease, lease_s=lease_s, stage=stage, fraction=fraction)
+        return beat.still_held and not beat.cancel_requested
+
+    fields = {"job": lease.job_id, "frame": lease.number}
+    with Heart(prolong, lease_s=lease_s, fields=fields) as heart, _outcome(context, lease, heart):
         document, base_dir = context.job.load(lease.job_id, repository, context.store)
         prefix = frame_prefix(lease.job_id, lease.number)
         try:
@@ -185,7 +203,7 @@ def _run_leased(context: WorkerContext, lease: Lease) -> None:
             # Another attempt has published the manifest first: the frame is done, by the other one's products.
             if not context.store.exists(f"{prefix}/manifest.json"):
                 raise
-        changed = _patiently(lambda: repository.complete(lease), context.settings.lease_s)
+        changed = patiently(lambda: repository.complete(lease), context.settings.lease_s)
         log.info("frame done" if changed else "frame was done already", seconds=round(time.monotonic() - started, 3))
 
 
@@ -197,7 +215,7 @@ def _outcome(context: WorkerContext, lease: Lease, heart: Heart) -> Iterator[Non
     except CancelledError as error:
         if heart.should_cancel():
             log.info("frame stopped")
-            _patiently(lambda: context.repository.stop(lease), context.settings.lease_s)
+            patiently(lambda: context.repository.stop(lease), context.settings.lease_s)
         else:
             _record_failure(context, lease, str(error), error.code, retryable=True)
     except FullwellError as error:
@@ -211,13 +229,13 @@ def _outcome(context: WorkerContext, lease: Lease, heart: Heart) -> Iterator[Non
 
 def _record_failure(context: WorkerContext, lease: Lease, cause: str, code: str, *, retryable: bool) -> None:
     log.warning("frame attempt failed", cause=cause, code=code, retryable=retryable)
-    _patiently(
+    patiently(
         lambda: context.repository.fail(lease, cause=cause, code=code, retryable=retryable, rule=context.rule),
         context.settings.lease_s,
     )
 
 
-def _patiently(action: Callable[[], T], patience_s: float) -> T:
+def patiently(action: Callable[[], T], patience_s: float) -> T:
     """Return what `action` returns, trying again while the database is away, for `patience_s` at most."""
     deadline = time.monotonic() + patience_s
     while True:

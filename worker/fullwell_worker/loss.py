@@ -18,12 +18,13 @@ PATIENCE_S: Final = 20.0
 
 @dataclass(frozen=True, slots=True)
 class Loss:
-    """Frames of a message whose worker died, and how."""
+    """The work of a message whose worker died, and how: frames of a job, or one ingestion."""
 
-    job_id: str
-    numbers: tuple[int, ...]
     worker: str
     cause: str
+    job_id: str = ""
+    numbers: tuple[int, ...] = ()
+    ingestion_id: str = ""
 
 
 def record_loss_in_a_process(loss: Loss) -> None:
@@ -35,15 +36,19 @@ def record_loss_in_a_process(loss: Loss) -> None:
 def main(arguments: list[str]) -> int:
     """Record the loss that is given as JSON."""
     from fullwell.jobs.database import Database  # noqa: PLC0415
+    from fullwell.jobs.ingestions import IngestionRepository  # noqa: PLC0415
     from fullwell.jobs.records import RetryRule  # noqa: PLC0415
     from fullwell.jobs.repository import JobRepository  # noqa: PLC0415
 
-    given = json.loads(arguments[0])
+    loss = Loss(**json.loads(arguments[0]))
     settings = load_settings()
     rule = RetryRule(settings.max_attempts, settings.retry_delay_s)
     try:
-        repository = JobRepository(Database(settings.database))
-        repository.lose(given["job_id"], given["numbers"], worker=given["worker"], cause=given["cause"], rule=rule)
+        database = Database(settings.database)
+        if loss.ingestion_id:
+            IngestionRepository(database).lose(loss.ingestion_id, worker=loss.worker, cause=loss.cause, rule=rule)
+        else:
+            JobRepository(database).lose(loss.job_id, loss.numbers, worker=loss.worker, cause=loss.cause, rule=rule)
     except FullwellError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from fullwell.core.settings import load_settings
 
 if TYPE_CHECKING:
+    from fullwell.assets.store import StoredAssets
     from fullwell.pipeline import StageStore
     from fullwell.schema import RecipeBuilder, RecipeDocument
     from fullwell.storage import ObjectStore
@@ -56,6 +57,7 @@ class PipelineRunner:
         self._document: RecipeDocument | None = None
         self._builder: RecipeBuilder | None = None
         self._stages: StageStore | None = None
+        self._assets: StoredAssets | None = None
 
     def __call__(
         self,
@@ -77,7 +79,7 @@ class PipelineRunner:
             limit = load_settings().cache_bytes
             self._stages = StageStore(store, max_bytes=limit) if limit else None
         if self._builder is None or self._document is not document:
-            self._document, self._builder = document, RecipeBuilder(document, base_dir=base_dir)
+            self._document, self._builder = document, RecipeBuilder(document, base_dir=base_dir, assets=self._assets_of(store))
         return run_frame(
             document,
             index,
@@ -88,3 +90,13 @@ class PipelineRunner:
             progress=progress,
             should_cancel=should_cancel,
         )
+
+    def _assets_of(self, store: ObjectStore) -> StoredAssets:
+        """Return the models of the store's assets, which all processes of this machine keep in one folder."""
+        from fullwell.assets.cache import BlobCache  # noqa: PLC0415
+        from fullwell.assets.store import StoredAssets  # noqa: PLC0415
+
+        if self._assets is None or self._assets.store is not store:
+            settings = load_settings()
+            self._assets = StoredAssets(store, BlobCache(settings.asset_cache, settings.asset_cache_bytes))
+        return self._assets

@@ -82,6 +82,7 @@ class Settings(BaseSettings):
     preview_on_ingest: bool = True
 
     cache_bytes: int = Field(default=8192 * MIB, ge=0)
+    asset_cache_bytes: int = Field(default=4096 * MIB, ge=64 * MIB)
 
     lease_s: float = Field(default=30.0, ge=1.0, le=3600.0)
     reap_interval_s: float = Field(default=2.0, ge=0.1, le=60.0)
@@ -152,6 +153,11 @@ class Settings(BaseSettings):
     def store(self) -> str:
         """The object store's address: as set, or the folder below `home`."""
         return self.store_url or (self.home / "store").as_uri()
+
+    @property
+    def asset_cache(self) -> Path:
+        """The folder in which this machine keeps models of the asset store, up to `asset_cache_bytes`."""
+        return self.home / "asset-cache"
 
     @property
     def health_file(self) -> Path:

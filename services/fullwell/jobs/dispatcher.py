@@ -1,4 +1,4 @@
-"""The loop that keeps every frame moving: it sends what is due and takes back what a dead worker held."""
+"""The loop that keeps frames and ingestions moving: it sends what is due and takes back what a dead worker held."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import structlog
 
 from fullwell.core import FullwellError
+from fullwell.jobs.ingestions import IngestionRepository
 from fullwell.jobs.queue import TaskQueue
 from fullwell.jobs.records import RetryRule
 from fullwell.jobs.repository import JobRepository
@@ -29,10 +30,19 @@ class DispatcherTiming:
 
 
 class Dispatcher:
-    """Runs `round` in a thread of its own. Several processes may each have one: frames are claimed in the database."""
+    """Runs `round` in a thread of its own. Several processes may each have one: work is claimed in the database."""
 
-    def __init__(self, repository: JobRepository, queue: TaskQueue, *, rule: RetryRule, timing: DispatcherTiming) -> None:
+    def __init__(
+        self,
+        repository: JobRepository,
+        queue: TaskQueue,
+        *,
+        ingestions: IngestionRepository,
+        rule: RetryRule,
+        timing: DispatcherTiming,
+    ) -> None:
         self._repository = repository
+        self._ingestions = ingestions
         self._queue = queue
         self._rule = rule
         self._timing = timing
@@ -66,14 +76,29 @@ class Dispatcher:
         """Take back lost frames, find lost messages, send what is due."""
         for loss in self._repository.reap(self._rule):
             log.warning("frame taken back", job=loss.job_id, frame=loss.number, attempt=loss.attempt, cause=loss.cause)
+        for work in self._ingestions.reap(self._rule):
+            log.warning("ingestion taken back", ingestion=work.id, attempt=work.attempt, cause=work.cause)
         # Counted before sending: a message of this round must not hide that older ones are lost.
         if self._queue.waiting() == 0:
             forgotten = self._repository.forget_messages(older_than_s=self._timing.lost_after_s)
-            if forgotten:
-                log.warning("messages lost by the broker", frames=forgotten)
+            ingestions = self._ingestions.forget_messages(older_than_s=self._timing.lost_after_s)
+            if forgotten or ingestions:
+                log.warning("messages lost by the broker", frames=forgotten, ingestions=ingestions)
+        self._send_ingestions()  # before the frames: a curator waits for them, and they are few
         while self._send_due():
             pass
         self._repository.remove_silent_workers(silent_for_s=self._timing.worker_silence_s)
+
+    def _send_ingestions(self) -> None:
+        batch = self._ingestions.claim_due(limit=BATCH)
+        for position, (ingestion_id, priority) in enumerate(batch):
+            try:
+                self._queue.enqueue_ingestion(ingestion_id, priority=priority)
+            except FullwellError:
+                for unsent, _ in batch[position:]:
+                    self._ingestions.unclaim(unsent)
+                raise
+            log.info("ingestion enqueued", ingestion=ingestion_id)
 
     def _send_due(self) -> bool:
         batch = self._repository.claim_due(limit=BATCH)

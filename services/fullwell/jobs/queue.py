@@ -11,9 +11,12 @@ from celery import Celery
 from fullwell.core import ServiceError
 from fullwell.core.settings import Settings
 
-__all__ = ["RENDER_TASK", "CeleryTaskQueue", "TaskQueue", "celery_application", "chunks_of"]
+__all__ = ["INGEST_TASK", "RENDER_TASK", "CeleryTaskQueue", "TaskQueue", "celery_application", "chunks_of"]
 
 RENDER_TASK: Final = "fullwell.render_frames"
+INGEST_TASK: Final = "fullwell.ingest_asset"
+PREVIEW_LIMIT_S: Final = 1800.0
+"""All previews of one asset; each is a small image with the limits of a frame of its own."""
 PRIORITY_STEPS: Final = (0, 3, 6, 9)
 PRIORITY_SEPARATOR: Final = ":"
 MAX_CHUNK: Final = 16
@@ -23,10 +26,13 @@ LIMIT_MARGIN_S: Final = 60.0
 
 
 class TaskQueue(Protocol):
-    """Carries "these frames are to be rendered" to a worker, at least once each. The database, not the queue, is the truth."""
+    """Carries "this is to be done" to a worker, at least once each. The database, not the queue, is the truth."""
 
     def enqueue(self, job_id: str, numbers: Sequence[int], *, priority: int = 3) -> None:
         """Send the messages of frames of one job; ServiceError when the broker cannot be reached."""
+
+    def enqueue_ingestion(self, ingestion_id: str, *, priority: int = 3) -> None:
+        """Send the message of work on one asset; ServiceError when the broker cannot be reached."""
 
     def waiting(self) -> int:
         """Return the number of messages that no worker has taken yet."""
@@ -96,16 +102,26 @@ class CeleryTaskQueue:
 
     def enqueue(self, job_id: str, numbers: Sequence[int], *, priority: int = 3) -> None:
         """Send the messages of frames of one job; ServiceError when the broker cannot be reached."""
+        limit_s = self._settings.frame_time_limit_s + LIMIT_MARGIN_S
+        messages = [([job_id, chunk], limit_s * len(chunk)) for chunk in chunks_of(numbers)]
+        self._send(RENDER_TASK, messages, priority)
+
+    def enqueue_ingestion(self, ingestion_id: str, *, priority: int = 3) -> None:
+        """Send the message of work on one asset; ServiceError when the broker cannot be reached."""
+        limit_s = self._settings.ingest_time_limit_s + PREVIEW_LIMIT_S + LIMIT_MARGIN_S
+        self._send(INGEST_TASK, [([ingestion_id], limit_s)], priority)
+
+    def _send(self, task: str, messages: Sequence[tuple[list[Any], float]], priority: int) -> None:
         try:
             with self._application.producer_pool.acquire(block=True, timeout=10) as producer:
-                for chunk in chunks_of(numbers):
+                for arguments, limit_s in messages:
                     self._application.send_task(
-                        RENDER_TASK,
-                        args=[job_id, chunk],
+                        task,
+                        args=arguments,
                         priority=priority,
                         producer=producer,
                         retry=False,
-                        time_limit=(self._settings.frame_time_limit_s + LIMIT_MARGIN_S) * len(chunk),
+                        time_limit=limit_s,
                         ignore_result=True,
                     )
         except Exception as error:  # kombu raises the errors of whatever transport is configured

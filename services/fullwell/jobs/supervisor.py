@@ -24,6 +24,7 @@ from fullwell.core.settings import Settings
 from fullwell.jobs.children import exit_text, start_child
 from fullwell.jobs.database import Database
 from fullwell.jobs.embedded import ServiceInfo, hold_home, publish_service
+from fullwell.jobs.ingestions import IngestionRepository
 from fullwell.jobs.repository import JobRepository
 
 __all__ = ["serve"]
@@ -167,6 +168,7 @@ class _Service:
             database.upgrade()
             if not self._settings.broker_url:  # a fresh broker holds none of the messages that were sent to the last one
                 JobRepository(database).forget_messages(older_than_s=-1.0)
+                IngestionRepository(database).forget_messages(older_than_s=-1.0)
         finally:
             database.close()
 

@@ -1,0 +1,123 @@
+"""What somebody asks ingestion for: uploaded files by digest, and what they say of them. Checked before any work."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import PurePosixPath
+from typing import Any, Final
+
+from fullwell.assets.classes import asset_class
+from fullwell.assets.meshes import MODEL_SUFFIXES
+from fullwell.assets.records import LicenceRecord, check_asset_id, check_tags
+from fullwell.core import FieldError
+from fullwell.jobs.files import check_files, relative_path
+
+__all__ = ["ARCHIVE_SUFFIXES", "AssetRequest", "main_file"]
+
+ARCHIVE_SUFFIXES: Final = (".zip",)
+"""Archives whose content is unpacked by ingestion."""
+AXES: Final = ("x", "-x", "y", "-y", "z", "-z")
+MAX_TEXT: Final = 500
+
+
+@dataclass(frozen=True, slots=True)
+class AssetRequest:
+    """One asset to be made from uploaded files.
+
+    Attributes
+    ----------
+    files
+        {relative path: SHA-256} of the blobs.
+    main
+        The path in `files` that is the model, or an archive with one in it.
+    asset_class, title, id, tags, licence
+        As in the manifest; an empty id or title is made from the file's name.
+    unit_m, up_axis, forward_axis
+        Metres per unit and axes of the file; empty where they are to be detected. Axes are "x", "-x" and so on.
+    length_m
+        Extent along x that the asset is scaled to [m]; None keeps the file's scale.
+    variant
+        {USD variant set: variant}.
+    """
+
+    files: Mapping[str, str]
+    main: str
+    asset_class: str
+    licence: LicenceRecord
+    id: str = ""
+    title: str = ""
+    tags: tuple[str, ...] = ()
+    unit_m: float | None = None
+    up_axis: str = ""
+    forward_axis: str = ""
+    length_m: float | None = None
+    variant: Mapping[str, str] = field(default_factory=dict)
+
+    def checked(self) -> AssetRequest:
+        """Return the request in normal form; FieldError names the first field that is not legal."""
+        files = check_files(self.files)
+        asset_class(self.asset_class, path="class")
+        _check_texts({"title": self.title, "licence": self.licence.spdx, "attribution": self.licence.attribution})
+        if not self.licence.spdx.strip():
+            raise FieldError("licence is empty; must be an SPDX expression such as CC0-1.0 or CC-BY-4.0.", "licence", "")
+        if self.id:
+            check_asset_id(self.id)
+        for name in ("unit_m", "length_m"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and 1e-6 <= value <= 1e5):
+                raise FieldError(f"{name} is {value!r}; must be in [1e-6, 1e5] m.", name, value)
+        for name in ("up_axis", "forward_axis"):
+            if getattr(self, name) not in ("", *AXES):
+                raise FieldError(
+                    f"{name} is {getattr(self, name)!r}; must be one of {', '.join(AXES)}.", name, getattr(self, name)
+                )
+        main = main_file(files, self.main)
+        return replace(self, files=files, main=main, tags=check_tags(self.tags))
+
+    def to_json(self) -> str:
+        """Return the request as JSON that `from_json` reads."""
+        return json.dumps(asdict(self), sort_keys=True)
+
+    @classmethod
+    def from_json(cls, text: str) -> AssetRequest:
+        """Return the request that `to_json` wrote."""
+        given: dict[str, Any] = json.loads(text)
+        return cls(**given | {"licence": LicenceRecord(**given["licence"]), "tags": tuple(given["tags"])})
+
+
+def main_file(names: Iterable[str], given: str = "") -> str:
+    """Return the model among files: as given, or the only one that can be it.
+
+    Raises
+    ------
+    FieldError
+        None can be it, several can, or the given one is not among them.
+    """
+    known = list(names)
+    if given:
+        main = relative_path(given, path="main")
+        if main not in known:
+            raise FieldError(f"main is {given[:120]!r}; must be one of the files: {_some(known)}.", "main", given[:120])
+        return main
+    suffixes = (*MODEL_SUFFIXES, *ARCHIVE_SUFFIXES)
+    found = [name for name in known if PurePosixPath(name).suffix.casefold() in suffixes]
+    if len(found) == 1:
+        return found[0]
+    if not found:
+        raise FieldError(f"files holds no model; one must end in {', '.join(suffixes)}. There are: {_some(known)}.", "files")
+    raise FieldError(f"files holds {len(found)} models: {_some(found)}. Name one of them in main.", "main")
+
+
+def _check_texts(texts: Mapping[str, str]) -> None:
+    for name, text in texts.items():
+        if len(text) > MAX_TEXT or any(ord(character) < 32 for character in text):
+            raise FieldError(
+                f"{name} has {len(text)} characters; must have at most {MAX_TEXT}, none of them a control character.", name
+            )
+
+
+def _some(names: list[str]) -> str:
+    return ", ".join(repr(name[:80]) for name in names[:5]) + (", ..." if len(names) > 5 else "") or "none"
