@@ -1,3 +1,3 @@
-"""Road networks, SUMO runs and street objects. Nothing is in it yet: traffic recipes are not read by this version."""
+"""Road networks, SUMO runs and street objects. Recipes do not read them yet."""
 
 __all__: list[str] = []

@@ -1,0 +1,243 @@
+"""A road network as geometry: lanes, junctions, crossings and signals, in the world's coordinates."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fullwell.traffic.networks import NetworkFile
+from fullwell.traffic.sumo import TrafficError
+
+__all__ = ["Junction", "Lane", "LaneKind", "RoadNetwork", "SignalLink", "read_network"]
+
+Array = NDArray[np.float64]
+LaneKind = Literal["drive", "bus", "bike", "sidewalk", "shoulder", "rail", "crossing", "walking_area", "internal"]
+
+_FAR_M: Final = 10_000.0
+"""Networks that lie farther from their origin are moved: float32 is 1 mm coarse at 10 km."""
+
+_DEFAULT_WIDTHS_M: Final[Mapping[str, float]] = {"sidewalk": 2.0, "crossing": 4.0, "bike": 1.5}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lane:
+    """One lane.
+
+    Attributes
+    ----------
+    id, edge_id, index
+        SUMO's; index 0 is the rightmost of its edge.
+    kind
+        By who may use it.
+    centre_m
+        (n, 3) centre line in driving direction; the outline of a walking area.
+    width_m, speed_m_s
+        Width, and speed limit.
+    street
+        Name of the street, empty where unknown.
+    """
+
+    id: str
+    edge_id: str
+    index: int
+    kind: LaneKind
+    centre_m: Array
+    width_m: float
+    speed_m_s: float
+    street: str = ""
+
+    @property
+    def length_m(self) -> float:
+        """Length of the centre line."""
+        return float(np.linalg.norm(np.diff(self.centre_m, axis=0), axis=1).sum())
+
+    def at(self, distance_m: float) -> tuple[Array, Array]:
+        """Return the point (3,) at a distance along the lane, and the unit direction (3,) there; ends are held."""
+        steps = np.diff(self.centre_m, axis=0)
+        lengths = np.linalg.norm(steps, axis=1)
+        ends = np.cumsum(lengths)
+        place = int(np.clip(np.searchsorted(ends, distance_m), 0, len(steps) - 1))
+        before = ends[place] - lengths[place]
+        share = np.clip((distance_m - before) / max(lengths[place], 1e-9), 0.0, 1.0)
+        return self.centre_m[place] + share * steps[place], steps[place] / max(lengths[place], 1e-9)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Junction:
+    """A junction: `kind` is SUMO's type (traffic_light, priority, dead_end, ...), `outline_m` (n, 3) its polygon."""
+
+    id: str
+    kind: str
+    centre_m: Array
+    outline_m: Array
+
+
+@dataclass(frozen=True, slots=True)
+class SignalLink:
+    """One controlled movement: `index` into the state text of signal `signal`, from lane to lane; `crossing` for walkers."""
+
+    signal: str
+    index: int
+    from_lane: str
+    to_lane: str
+    crossing: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoadNetwork:
+    """A network in metres, x east, y north, z up.
+
+    Attributes
+    ----------
+    origin_m
+        (3,) what was subtracted from SUMO's coordinates: world = SUMO - origin. Zero but for networks far from their origin.
+    location
+        The network's own words on projection and offset (netOffset, projParameter, ...): with them a position on the map
+        follows, see `to_map`.
+    successors
+        {edge: the edges that connections lead to}.
+    """
+
+    file: NetworkFile
+    lanes: tuple[Lane, ...]
+    junctions: tuple[Junction, ...]
+    signals: tuple[SignalLink, ...]
+    origin_m: Array
+    location: Mapping[str, str]
+    successors: Mapping[str, tuple[str, ...]]
+
+    def reachable(self, edge: str) -> frozenset[str]:
+        """Return the edges that some vehicle can come to from an edge, itself among them."""
+        seen, ahead = {edge}, [edge]
+        while ahead:
+            for following in self.successors.get(ahead.pop(), ()):
+                if following not in seen:
+                    seen.add(following)
+                    ahead.append(following)
+        return frozenset(seen)
+
+    def lane(self, name: str) -> Lane:
+        """Return a lane by its id; KeyError where there is none."""
+        return self._by_id()[name]
+
+    def _by_id(self) -> dict[str, Lane]:
+        return {lane.id: lane for lane in self.lanes}
+
+    def of_kind(self, *kinds: LaneKind) -> tuple[Lane, ...]:
+        """Return the lanes of some kinds."""
+        return tuple(lane for lane in self.lanes if lane.kind in kinds)
+
+    def bounds_m(self) -> Array:
+        """(2, 3) lower and upper corner of all lanes and junctions."""
+        points = np.concatenate([lane.centre_m for lane in self.lanes] + [junction.outline_m for junction in self.junctions])
+        return np.array([points.min(axis=0), points.max(axis=0)])
+
+    def to_map(self, world_m: Array) -> Array:
+        """Return map coordinates (..., 2) of world points (..., 2 or 3): those of the file that the network was made of.
+
+        In metres of the file's projection; for a network without one, the coordinates as the file gives them.
+        """
+        offset = np.array([float(value) for value in self.location.get("netOffset", "0,0").split(",")][:2])
+        return np.asarray(np.asarray(world_m, dtype=np.float64)[..., :2] + self.origin_m[:2] - offset)
+
+
+def read_network(file: NetworkFile, *, path: str = "scene.traffic.network") -> RoadNetwork:
+    """Return the geometry of a network. Raises TrafficError where it cannot be read or holds no lane for vehicles."""
+    net = _sumo_net(file, path)
+    lanes = list(_lanes(net))
+    if not any(lane.kind in ("drive", "bus", "bike", "rail") for lane in lanes):
+        raise TrafficError(f"{path} holds no lane for vehicles. Choose a file or an area with streets.", path)
+    junctions = list(_junctions(net))
+    origin = _origin(lanes)
+    if origin.any():
+        lanes = [_moved_lane(lane, origin) for lane in lanes]
+        junctions = [Junction(item.id, item.kind, item.centre_m - origin, item.outline_m - origin) for item in junctions]
+    location = {str(key): str(value) for key, value in net._location.items()}
+    return RoadNetwork(file, tuple(lanes), tuple(junctions), tuple(_signals(net)), origin, location, _successors(net))
+
+
+def _sumo_net(file: NetworkFile, path: str) -> Any:
+    from sumolib import net  # noqa: PLC0415 - an extra
+
+    with tempfile.NamedTemporaryFile(suffix=".net.xml") as copy:
+        copy.write(file.xml)
+        copy.flush()
+        try:
+            return net.readNet(copy.name, withInternal=True, withPrograms=True, withPedestrianConnections=True)
+        except Exception as error:  # sumolib raises whatever its parser meets
+            raise TrafficError(f"{path} is damaged: {error}. Make it again with netconvert.", path) from error
+
+
+def _lanes(net: Any) -> Iterator[Lane]:
+    for edge in net.getEdges(withInternal=True):
+        for lane in edge.getLanes():
+            kind = _kind(edge.getFunction(), set(lane.getPermissions()))
+            shape = _points(lane.getShape3D())
+            if len(shape) < 2:
+                continue
+            width = float(lane.getWidth()) or _DEFAULT_WIDTHS_M.get(kind, 3.2)
+            name = str(edge.getName() or "")
+            yield Lane(lane.getID(), edge.getID(), lane.getIndex(), kind, shape, width, float(lane.getSpeed()), name)
+
+
+def _kind(function: str, permissions: set[str]) -> LaneKind:
+    if function in ("crossing", "walkingarea"):
+        return "crossing" if function == "crossing" else "walking_area"
+    if function == "internal":
+        return "internal"
+    if "passenger" in permissions:
+        return "drive"
+    if permissions & {"bus", "coach", "delivery", "truck"}:
+        return "bus"
+    if permissions & {"tram", "rail", "rail_urban", "rail_electric", "rail_fast", "subway"}:
+        return "rail"
+    if "bicycle" in permissions:
+        return "bike"
+    if "pedestrian" in permissions:
+        return "sidewalk"
+    return "shoulder"
+
+
+def _junctions(net: Any) -> Iterator[Junction]:
+    for node in net.getNodes():
+        outline = _points(node.getShape3D())
+        if len(outline) >= 3:
+            x, y, *rest = node.getCoord3D()
+            yield Junction(node.getID(), node.getType(), np.array([x, y, rest[0] if rest else 0.0]), outline)
+
+
+def _signals(net: Any) -> Iterator[SignalLink]:
+    for signal in net.getTrafficLights():
+        for start, end, index in signal.getConnections():
+            crossing = start.getEdge().getFunction() in ("crossing", "walkingarea") or end.getEdge().getFunction() == "crossing"
+            yield SignalLink(signal.getID(), int(index), start.getID(), end.getID(), crossing)
+
+
+def _successors(net: Any) -> dict[str, tuple[str, ...]]:
+    return {edge.getID(): tuple(sorted(other.getID() for other in edge.getOutgoing())) for edge in net.getEdges()}
+
+
+def _points(shape: Any) -> Array:
+    points = np.array([[*point, 0.0][:3] for point in shape], dtype=np.float64).reshape(-1, 3)
+    if len(points) > 1:  # coincident points have no direction
+        apart = np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-6])
+        points = points[apart]
+    return points
+
+
+def _origin(lanes: list[Lane]) -> Array:
+    points = np.concatenate([lane.centre_m for lane in lanes])
+    if float(np.abs(points[:, :2]).max()) <= _FAR_M:
+        return np.zeros(3)
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    return np.array([math.floor(middle[0]), math.floor(middle[1]), 0.0])
+
+
+def _moved_lane(lane: Lane, origin: Array) -> Lane:
+    return Lane(lane.id, lane.edge_id, lane.index, lane.kind, lane.centre_m - origin, lane.width_m, lane.speed_m_s, lane.street)
