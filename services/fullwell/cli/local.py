@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
     from fullwell.pipeline import StageStore
-    from fullwell.schema import RecipeDocument
+    from fullwell.schema import RecipeBuilder, RecipeDocument
+    from fullwell.schema.assets import AssetSource
 
 __all__ = ["register"]
 
@@ -66,9 +67,9 @@ def render(
     from fullwell.schema import RecipeBuilder
     from fullwell.storage import LocalStore
 
-    document = _load(recipe, overrides)
+    document, assets = _pinned(_load(recipe, overrides))
     wanted = _frame_range(frames, document.frame_count())
-    builder = RecipeBuilder(document, base_dir=document.base_dir)
+    builder = RecipeBuilder(document, base_dir=document.base_dir, assets=assets)
     builder.validate()  # a frame that cannot be made is found before the first one is
     folder = output if output is not None else Path("out") / document.name
     store = LocalStore(folder)
@@ -80,7 +81,7 @@ def render(
             bar = bars.add_task(f"frame {index}: load", total=1.0)
             prefix = f"frames/{index}"
             if force:
-                _forget_other(store, prefix, document, index, skip=not no_skip)
+                _forget_other(store, prefix, builder, index, skip=not no_skip)
             manifest = run_frame(
                 document,
                 index,
@@ -141,16 +142,28 @@ def _cache_folder() -> Path:
     return (Path(given) if given.startswith("/") else Path.home() / ".cache") / "fullwell"
 
 
-def _forget_other(store: Any, prefix: str, document: RecipeDocument, index: int, *, skip: bool) -> None:
+def _pinned(document: RecipeDocument) -> tuple[RecipeDocument, AssetSource | None]:
+    """Return the recipe with its draws pinned to what this machine's asset store holds now, and that store."""
+    from fullwell.schema.assets import asks_for_assets, pin_assets
+
+    if not asks_for_assets(document):
+        return document, None
+    from fullwell.core.settings import load_settings
+    from fullwell.pipeline.assets import assets_of_settings
+
+    assets = assets_of_settings(load_settings())
+    return pin_assets(document, assets), assets
+
+
+def _forget_other(store: Any, prefix: str, builder: RecipeBuilder, index: int, *, skip: bool) -> None:
     """Remove a published frame that was made from another recipe; the same frame is left alone and reused."""
     from fullwell.dataset.encode import decode_json
     from fullwell.pipeline import MANIFEST_NAME
     from fullwell.pipeline.keys import frame_digest
-    from fullwell.schema import build_frame
 
     key = f"{prefix}/{MANIFEST_NAME}"
     if store.exists(key):
-        digest = frame_digest(build_frame(document, index, base_dir=document.base_dir), skip=skip)
+        digest = frame_digest(builder.frame(index), skip=skip)
         if decode_json(store.get(key)).get("frame_digest") != digest:
             store.delete(key)  # the commit point first: a crash in between leaves products that nobody reads
             store.delete_prefix(f"{prefix}/")
@@ -169,8 +182,8 @@ def plan(
     from fullwell.pipeline import plan_document, plan_frame, with_cache_steps
     from fullwell.schema import build_frame
 
-    document = _load(recipe, overrides)
-    described = build_frame(document, frame, base_dir=document.base_dir)
+    document, assets = _pinned(_load(recipe, overrides))
+    described = build_frame(document, frame, base_dir=document.base_dir, assets=assets)
     decided = plan_frame(described, skip=not no_skip)
     stages = None if no_cache else _stage_store(cache)
     if stages is not None:
@@ -193,8 +206,8 @@ def validate(recipe: RecipeArgument, overrides: SetOption = None, as_json: JsonO
     from fullwell.schema import validate as validate_document
 
     try:
-        document = _load(recipe, overrides)
-        validate_document(document, base_dir=document.base_dir)
+        document, assets = _pinned(_load(recipe, overrides))
+        validate_document(document, base_dir=document.base_dir, assets=assets)
     except RecipeError as error:
         if not as_json:
             raise

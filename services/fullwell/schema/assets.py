@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from fullwell.assets.query import AssetQuery
 from fullwell.assets.records import AssetManifest
@@ -15,7 +15,7 @@ from fullwell.schema.v1.geometry import AssetGeometry
 from fullwell.schema.v1.recipe import RecipeDocument
 from fullwell.schema.variation import extreme_values
 
-__all__ = ["AssetSource", "StoredAssetFiles", "pin_assets", "pins_of", "split_pin"]
+__all__ = ["AssetSource", "StoredAssetFiles", "asks_for_assets", "pin_assets", "pins_of", "split_pin"]
 
 _PIN = re.compile(r"(?P<id>[a-z0-9._-]{1,80})@(?P<digest>[0-9a-f]{64})")
 
@@ -32,6 +32,7 @@ class StoredAssetFiles(Protocol):
         ...
 
 
+@runtime_checkable
 class AssetSource(StoredAssetFiles, Protocol):
     """An asset store that can be searched too."""
 
@@ -72,6 +73,15 @@ def pin_assets(document: RecipeDocument, source: AssetSource) -> RecipeDocument:
     pinned = document.model_copy(update={"assets": pins})
     pinned._base_dir = document.base_dir
     return pinned
+
+
+def asks_for_assets(document: RecipeDocument) -> bool:
+    """Return whether a recipe has assets, or `vary` may give it some."""
+    geometries = [item.geometry for item in document.scene.objects]
+    geometries += [part.geometry for item in document.scene.objects for part in item.parts or []]
+    if any(isinstance(geometry, AssetGeometry) for geometry in geometries):
+        return True
+    return document.vary is not None and '"asset"' in document.vary.model_dump_json()
 
 
 def no_candidate(path: str, query: AssetQuery) -> str:

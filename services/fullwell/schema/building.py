@@ -21,7 +21,7 @@ from fullwell.schema.variation import extreme_values, frame_values
 if TYPE_CHECKING:
     from fullwell.radiometry.grid import WavelengthGrid
     from fullwell.scene import Film
-    from fullwell.schema.assets import AssetSource
+    from fullwell.schema.assets import StoredAssetFiles
     from fullwell.schema.conversion.context import Context, RecipeFiles
     from fullwell.schema.conversion.scenes import PlacedScene
     from fullwell.schema.frame import CameraRig, FrameDescription, Quality, View
@@ -39,7 +39,7 @@ DEFAULT_NOISE_RATIO = 0.5
 
 
 def build_frame(
-    document: RecipeDocument, index: int = 0, *, base_dir: Path | None = None, assets: AssetSource | None = None
+    document: RecipeDocument, index: int = 0, *, base_dir: Path | None = None, assets: StoredAssetFiles | None = None
 ) -> FrameDescription:
     """Return frame `index` of a recipe, resolved and checked.
 
@@ -50,7 +50,9 @@ def build_frame(
     return RecipeBuilder(document, base_dir=base_dir, assets=assets).frame(index)
 
 
-def validate(document: RecipeDocument, *, base_dir: Path | None = None, assets: AssetSource | None = None) -> tuple[str, ...]:
+def validate(
+    document: RecipeDocument, *, base_dir: Path | None = None, assets: StoredAssetFiles | None = None
+) -> tuple[str, ...]:
     """Return the warnings of a recipe after building its first frame and checking every value that `vary` can set.
 
     Nothing is rendered. Raises RecipeError for the first thing that is wrong.
@@ -77,7 +79,9 @@ def _without_vary(document: RecipeDocument) -> RecipeDocument:
 class RecipeBuilder:
     """Builds the frames of one recipe; model files and digests are kept between frames."""
 
-    def __init__(self, document: RecipeDocument, *, base_dir: Path | None = None, assets: AssetSource | None = None) -> None:
+    def __init__(
+        self, document: RecipeDocument, *, base_dir: Path | None = None, assets: StoredAssetFiles | None = None
+    ) -> None:
         self._document = document
         self._base_dir = document.base_dir if base_dir is None else base_dir
         self._assets = assets

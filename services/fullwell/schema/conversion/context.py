@@ -19,7 +19,7 @@ from fullwell.schema.errors import RecipeError
 
 if TYPE_CHECKING:
     from fullwell.assets.model import LoadedModel
-    from fullwell.schema.assets import AssetSource
+    from fullwell.schema.assets import StoredAssetFiles
     from fullwell.schema.v1.recipe import RecipeDocument
 
 __all__ = ["Context", "RecipeFiles", "fail", "located"]
@@ -165,7 +165,7 @@ class Context:
 
     grid: WavelengthGrid
     files: RecipeFiles
-    assets: AssetSource | None = None
+    assets: StoredAssetFiles | None = None
     document: RecipeDocument | None = None
     seed: int = 0
     drawn_assets: dict[str, str] = field(default_factory=dict)
