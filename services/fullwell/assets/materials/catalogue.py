@@ -37,7 +37,11 @@ def asset_material_names() -> tuple[str, ...]:
 @cache
 def asset_materials() -> Mapping[str, SpectralMaterial]:
     """Return all materials by name; made on first use, in some hundredths of a second."""
-    entries = (
-        *coating_materials(), *metal_materials(), *natural_materials(), *textile_materials(), *lamp_materials(),
-    )  # fmt: skip
-    return MappingProxyType({entry.name: entry for entry in entries})
+    entries = (*coating_materials(), *metal_materials(), *natural_materials(), *textile_materials(), *lamp_materials())
+    families = list(dict.fromkeys(_family(entry.name) for entry in entries))
+    ordered = sorted(entries, key=lambda entry: families.index(_family(entry.name)))
+    return MappingProxyType({entry.name: entry for entry in ordered})
+
+
+def _family(name: str) -> str:
+    return name.partition("/")[0]

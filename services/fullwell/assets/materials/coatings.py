@@ -11,57 +11,57 @@ __all__ = ["coating_materials"]
 Mixture = dict[str, float]
 
 _PAINT: dict[str, Mixture] = {
-    "white": {"rutile": 1.0, "carbon_black": 0.0001, "iron_oxide_yellow": 0.004},
+    "white": {"rutile": 1.0, "carbon_black": 0.00006},
     "black": {"carbon_black": 1.0},
-    "grey": {"rutile": 1.0, "carbon_black": 0.065, "phthalo_blue": 0.02},
-    "silver": {"rutile": 1.0, "carbon_black": 0.009},
-    "red": {"dpp_red": 1.0, "rutile": 0.012, "iron_oxide_red": 0.08},
-    "blue": {"phthalo_blue": 1.0, "rutile": 0.22, "ultramarine": 0.6, "carbon_black": 0.005},
-    "brown": {"iron_oxide_red": 1.0, "carbon_black": 0.09, "iron_oxide_yellow": 0.5},
-    "green": {"phthalo_green": 0.6, "bismuth_vanadate": 0.35, "carbon_black": 0.02},
-    "yellow": {"bismuth_vanadate": 1.0, "rutile": 0.15, "iron_oxide_yellow": 0.03},
-    "orange": {"organic_orange": 1.0, "bismuth_vanadate": 0.05},
-    "beige": {"rutile": 1.0, "iron_oxide_yellow": 0.16, "carbon_black": 0.004, "iron_oxide_red": 0.01},
+    "grey": {"rutile": 1.0, "carbon_black": 0.05, "phthalo_blue": 0.012},
+    "silver": {"rutile": 1.0, "carbon_black": 0.0045},
+    "red": {"dpp_red": 1.0, "organic_orange": 0.1, "iron_oxide_red": 0.03},
+    "blue": {"phthalo_blue": 0.6, "rutile": 0.25, "ultramarine": 0.2, "carbon_black": 0.002},
+    "brown": {"iron_oxide_red": 1.0, "carbon_black": 0.07, "iron_oxide_yellow": 0.6},
+    "green": {"phthalo_green": 0.6, "bismuth_vanadate": 0.4, "carbon_black": 0.01},
+    "yellow": {"bismuth_vanadate": 1.0, "rutile": 0.15, "iron_oxide_yellow": 0.04},
+    "orange": {"organic_orange": 1.0, "bismuth_vanadate": 0.25},
+    "beige": {"rutile": 1.0, "iron_oxide_yellow": 0.12, "carbon_black": 0.003, "iron_oxide_red": 0.008},
 }
 
 _COATING: dict[str, Mixture] = {
-    "white": {"rutile": 1.0, "carbon_black": 0.0003, "iron_oxide_yellow": 0.005},
-    "black": {"carbon_black": 1.0, "rutile": 0.02},
-    "grey": {"rutile": 1.0, "carbon_black": 0.022, "iron_oxide_yellow": 0.01},
-    "green": {"chromium_oxide": 1.0, "phthalo_green": 0.12, "carbon_black": 0.01},
-    "red": {"dpp_red": 1.0, "iron_oxide_red": 0.25, "rutile": 0.01},
-    "yellow": {"bismuth_vanadate": 1.0, "iron_oxide_yellow": 0.08, "rutile": 0.1},
-    "blue": {"phthalo_blue": 0.5, "rutile": 0.2, "ultramarine": 0.8, "carbon_black": 0.004},
-    "orange": {"organic_orange": 1.0, "iron_oxide_red": 0.03, "bismuth_vanadate": 0.1},
+    "white": {"rutile": 1.0, "carbon_black": 0.0004, "iron_oxide_yellow": 0.001},
+    "black": {"carbon_black": 0.3, "rutile": 0.5},
+    "grey": {"rutile": 1.0, "carbon_black": 0.016, "iron_oxide_yellow": 0.005},
+    "green": {"chromium_oxide": 1.0, "phthalo_green": 0.1},
+    "red": {"dpp_red": 1.0, "iron_oxide_red": 0.15, "organic_orange": 0.15},
+    "yellow": {"bismuth_vanadate": 1.0, "iron_oxide_yellow": 0.12, "rutile": 0.05},
+    "blue": {"phthalo_blue": 0.5, "rutile": 0.35, "ultramarine": 0.2, "carbon_black": 0.002},
+    "orange": {"organic_orange": 1.0, "iron_oxide_red": 0.02, "bismuth_vanadate": 0.3},
 }
 
 _PLASTIC: dict[str, Mixture] = {
-    "black": {"carbon_black": 1.0, "rutile": 0.03},
+    "black": {"carbon_black": 0.3, "rutile": 0.4},
     "grey": {"rutile": 1.0, "carbon_black": 0.03},
-    "white": {"rutile": 1.0, "carbon_black": 0.0002},
-    "red": {"dpp_red": 1.0, "rutile": 0.02},
-    "green": {"phthalo_green": 0.4, "bismuth_vanadate": 0.3, "rutile": 0.05},
-    "blue": {"phthalo_blue": 0.4, "ultramarine": 0.6, "rutile": 0.25},
-    "yellow": {"bismuth_vanadate": 0.6, "organic_yellow": 0.5, "rutile": 0.2},
-    "orange": {"organic_orange": 1.0, "rutile": 0.01},
+    "white": {"rutile": 1.0, "carbon_black": 0.0003},
+    "red": {"dpp_red": 1.0, "organic_orange": 0.1, "rutile": 0.01},
+    "green": {"phthalo_green": 0.35, "bismuth_vanadate": 0.5, "rutile": 0.05},
+    "blue": {"phthalo_blue": 0.3, "ultramarine": 0.3, "rutile": 0.35},
+    "yellow": {"bismuth_vanadate": 0.6, "organic_yellow": 0.3, "rutile": 0.2},
+    "orange": {"organic_orange": 1.0, "bismuth_vanadate": 0.15},
 }
 
 _SIGN: dict[str, Mixture] = {
-    "white": {"rutile": 0.35, "chalk": 0.2, "carbon_black": 0.003},
-    "yellow": {"bismuth_vanadate": 0.6, "organic_yellow": 0.6, "rutile": 0.08, "carbon_black": 0.003},
-    "red": {"dpp_red": 1.0, "iron_oxide_red": 0.1, "carbon_black": 0.004},
-    "blue": {"phthalo_blue": 0.5, "ultramarine": 1.0, "rutile": 0.12},
-    "green": {"phthalo_green": 0.6, "rutile": 0.1, "organic_yellow": 0.15},
-    "black": {"carbon_black": 1.0, "rutile": 0.03},
-    "brown": {"iron_oxide_red": 0.6, "iron_oxide_yellow": 0.5, "carbon_black": 0.07},
+    "white": {"rutile": 0.5, "chalk": 0.2, "carbon_black": 0.0022},
+    "yellow": {"bismuth_vanadate": 1.0, "iron_oxide_yellow": 0.08, "carbon_black": 0.003},
+    "red": {"dpp_red": 1.0, "organic_orange": 0.08, "carbon_black": 0.001},
+    "blue": {"phthalo_blue": 0.5, "ultramarine": 0.4, "rutile": 0.16},
+    "green": {"phthalo_green": 0.5, "rutile": 0.12, "bismuth_vanadate": 0.1},
+    "black": {"carbon_black": 0.3, "rutile": 0.5},
+    "brown": {"iron_oxide_red": 0.6, "iron_oxide_yellow": 0.9, "carbon_black": 0.05},
 }
 
 _PAPER: dict[str, Mixture] = {
     "white": {"bleached_fibre": 1.0, "chalk": 0.5},
-    "poster_blue": {"bleached_fibre": 1.0, "phthalo_blue": 0.25},
-    "poster_red": {"bleached_fibre": 1.0, "dpp_red": 0.5},
-    "poster_green": {"bleached_fibre": 1.0, "phthalo_blue": 0.10, "organic_yellow": 0.3},
-    "poster_yellow": {"bleached_fibre": 1.0, "organic_yellow": 0.25},
+    "poster_blue": {"bleached_fibre": 1.0, "phthalo_blue": 0.5},
+    "poster_red": {"bleached_fibre": 1.0, "dpp_red": 1.5},
+    "poster_green": {"bleached_fibre": 1.0, "phthalo_blue": 0.3, "organic_yellow": 0.8},
+    "poster_yellow": {"bleached_fibre": 1.0, "organic_yellow": 0.6},
 }
 
 _LINE: dict[str, Mixture] = {
@@ -69,7 +69,7 @@ _LINE: dict[str, Mixture] = {
     "yellow_thermoplastic": {"bismuth_vanadate": 0.6, "organic_yellow": 0.2, "chalk": 0.5, "carbon_black": 0.004},
 }
 
-_RUBBER: dict[str, Mixture] = {"tyre": {"carbon_black": 1.0, "chalk": 1.2, "iron_oxide_yellow": 0.05}}
+_RUBBER: dict[str, Mixture] = {"tyre": {"carbon_black": 0.3, "chalk": 2.8, "iron_oxide_yellow": 0.05}}
 
 
 def coating_materials() -> tuple[SpectralMaterial, ...]:

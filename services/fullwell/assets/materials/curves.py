@@ -16,6 +16,7 @@ __all__ = [
     "WAVELENGTH_NM",
     "band",
     "edge",
+    "layer_over",
     "layer_reflectance",
     "reflectance_spectrum",
     "through_knots",
@@ -59,6 +60,22 @@ def layer_reflectance(absorption: ArrayLike, scattering: ArrayLike) -> Array:
     ratio = np.asarray(absorption, dtype=np.float64) / np.asarray(scattering, dtype=np.float64)
     # The reciprocal form keeps its digits for dark layers, where 1 + K/S and the root nearly cancel.
     return np.asarray(1.0 / (1.0 + ratio + np.sqrt(ratio * (ratio + 2.0))))
+
+
+def layer_over(base: ArrayLike, absorption_per_cm: ArrayLike, scattering_per_cm: ArrayLike, *, thickness_cm: float) -> Array:
+    """Return the reflectance of a layer of finite thickness over a base of known reflectance (Kubelka 1948, eqs. 20 and 27).
+
+    Absorption and scattering are K and S of Kubelka and Munk, twice and 3/4 times those of transport theory; all of one shape.
+    """
+    below = np.asarray(base, dtype=np.float64)
+    scattering = np.asarray(scattering_per_cm, dtype=np.float64)
+    a = 1.0 + np.asarray(absorption_per_cm, dtype=np.float64) / scattering
+    b = np.sqrt(a**2 - 1.0)
+    # Divided by cosh, so that thick, dark layers do not overflow.
+    depth = b * scattering * thickness_cm
+    divisor = a * np.tanh(depth) + b
+    back, through = np.tanh(depth) / divisor, b / (divisor * np.cosh(np.minimum(depth, 300.0)))
+    return np.asarray(back + through**2 * below / (1.0 - back * below))
 
 
 def reflectance_spectrum(values: ArrayLike, source: str) -> Spectrum:

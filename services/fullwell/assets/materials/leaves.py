@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 
 import numpy as np
 from scipy.special import exp1
 
 from fullwell.assets.materials.curves import WAVELENGTH_NM, Array
 from fullwell.assets.materials.surface import mean_transmittance
+from fullwell.assets.materials.tables import material_table
 
 __all__ = ["LEAF_SOURCE", "Leaf", "leaf_reflectance", "leaf_transmittance", "water_absorption_per_cm"]
 
@@ -104,8 +103,7 @@ def _pile(back: Array, through: Array, layers: float) -> tuple[Array, Array]:
 @cache
 def _constituents() -> Mapping[str, Array]:
     """Return the table at WAVELENGTH_NM; its values at 400 nm hold below."""
-    text = resources.files("fullwell.assets.materials").joinpath("data", "leaf.json").read_text(encoding="utf-8")
-    table = json.loads(text)["constituents"]["leaf"]
+    table = material_table("leaf")["constituents"]["leaf"]
     columns = [name for name in table if name not in ("first_nm", "step_nm")]
     known_nm = table["first_nm"] + table["step_nm"] * np.arange(len(table[columns[0]]))
     return {name: np.interp(WAVELENGTH_NM, known_nm, table[name]) for name in columns}

@@ -60,7 +60,7 @@ def _pigments() -> Mapping[str, tuple[Array, Array]]:
         "chromium_oxide": (band(455.0, 42.0, 2.4) + band(600.0, 42.0, 1.9) + edge(392.0, 10.0, 2.0) + 0.09, 0.9 * large),
         # Copper phthalocyanine, beta form: Q bands at 610 and 710 nm, Soret band in the near ultraviolet; clear beyond 800 nm.
         "phthalo_blue": (
-            band(620.0, 40.0, 7.0) + band(712.0, 30.0, 5.5) + band(565.0, 30.0, 2.5) + band(350.0, 40.0, 4.0) + 0.05,
+            band(620.0, 38.0, 7.0) + band(712.0, 30.0, 5.5) + band(560.0, 26.0, 1.6) + band(350.0, 40.0, 4.0) + 0.05,
             0.03 * small,
         ),
         "phthalo_green": (
@@ -69,8 +69,8 @@ def _pigments() -> Mapping[str, tuple[Array, Array]]:
         ),
         "ultramarine": (band(600.0, 48.0, 2.8) + band(540.0, 35.0, 0.7) + 0.02, 0.05 * small),
         # Diketopyrrolopyrrole red: absorbs 420 to 580 nm, steep flank.
-        "dpp_red": (edge(592.0, 7.5, 5.0) - edge(425.0, 18.0, 2.8) + 0.012, 0.25 * small),
-        "organic_orange": (edge(556.0, 8.0, 5.0) - edge(410.0, 18.0, 1.5) + 0.01, 0.22 * small),
+        "dpp_red": (edge(577.0, 7.5, 5.0) - edge(405.0, 14.0, 0.8) + 0.008, 0.32 * small),
+        "organic_orange": (edge(553.0, 8.0, 4.0) - edge(400.0, 18.0, 1.0) + 0.01, 0.3 * small),
         "bismuth_vanadate": (edge(478.0, 9.0, 4.5) + 0.012, 0.75 * relative**-0.7),
         "organic_yellow": (edge(488.0, 8.0, 6.0) + 0.01, 0.1 * small),
         # A fibre or sheet of cellulose: yellowish tail, water at 970 nm.
@@ -79,21 +79,23 @@ def _pigments() -> Mapping[str, tuple[Array, Array]]:
         # Dyes scatter nothing; their bands end before 800 nm, and the fibre shows.
         "black_dye": (edge(735.0, 18.0, 9.0) + 0.05, np.zeros_like(relative)),
         "indigo": (
-            band(665.0, 48.0, 4.0) + band(590.0, 42.0, 1.6) + band(420.0, 30.0, 0.5) + edge(400.0, 25.0, 1.0),
+            band(660.0, 45.0, 4.0) + band(600.0, 45.0, 2.6) + band(530.0, 45.0, 1.4) + edge(425.0, 25.0, 0.8),
             0.0 * relative,
         ),
         "navy_dye": (
             band(600.0, 55.0, 5.0) + band(670.0, 30.0, 3.0) + band(520.0, 35.0, 2.5) + edge(450.0, 25.0, 1.8) + 0.03,
             0.0 * relative,
         ),
-        "red_dye": (edge(598.0, 9.0, 4.0) - edge(430.0, 20.0, 1.8) + 0.01, 0.0 * relative),
-        "green_dye": (band(655.0, 45.0, 4.0) + band(600.0, 30.0, 1.2) + edge(465.0, 18.0, 3.0) + 0.03, 0.0 * relative),
+        "red_dye": (edge(583.0, 9.0, 4.0) - edge(405.0, 20.0, 0.6) + 0.01, 0.0 * relative),
+        "green_dye": (
+            band(655.0, 45.0, 4.0) + band(600.0, 30.0, 1.8) + edge(478.0, 14.0, 4.5) + 0.1,
+            0.0 * relative,
+        ),
         "yellow_dye": (edge(488.0, 10.0, 3.0) + 0.005, 0.0 * relative),
-        "orange_dye": (edge(568.0, 9.0, 4.0) - edge(420.0, 20.0, 1.5) + 0.005, 0.0 * relative),
+        "orange_dye": (edge(557.0, 9.0, 4.0) - edge(400.0, 20.0, 0.5) + 0.005, 0.0 * relative),
         # Melanins fall steadily with wavelength (Jacques 2013).
         "eumelanin": (relative**-3.3, 0.0 * relative),
         "pheomelanin": (relative**-4.75, 0.0 * relative),
-        # Lignin and its weathering products.
-        "lignin": (np.exp(-(WAVELENGTH_NM - 450.0) / 70.0), 0.0 * relative),
+        "keratin": (0.012 + 0.08 * np.exp(-(WAVELENGTH_NM - 380.0) / 60.0) + 0.008 * water, large),
     }
     return MappingProxyType(table)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
 from functools import cache
-from importlib import resources
 
 import numpy as np
 
-from fullwell.assets.materials.curves import WAVELENGTH_NM, Array, layer_reflectance
+from fullwell.assets.materials.curves import WAVELENGTH_NM, Array, layer_over, layer_reflectance
 from fullwell.assets.materials.leaves import water_absorption_per_cm
+from fullwell.assets.materials.tables import material_table
 
 __all__ = ["SKIN_INDEX", "SKIN_SOURCE", "skin_body_reflectance"]
 
@@ -22,8 +21,6 @@ SKIN_INDEX = 1.4
 _EPIDERMIS_CM = 0.006
 _HAEMOGLOBIN_MOL_PER_L = 150.0 / 64500.0
 _WATER_SHARE = 0.65
-_DIFFUSE_PATH = 2.0
-"""Mean path of diffuse light through a thin layer over its thickness (Kubelka and Munk)."""
 
 
 def skin_body_reflectance(*, melanin_share: float, blood_share: float, oxygenation: float = 0.75) -> Array:
@@ -38,7 +35,7 @@ def skin_body_reflectance(*, melanin_share: float, blood_share: float, oxygenati
     oxygenation
         Share of haemoglobin that carries oxygen.
 
-    The dermis is an infinite layer of Kubelka and Munk with K = 2 mu_a and S = 3/4 mu_s' (Star et al. 1988).
+    Layers of Kubelka and Munk, the dermis infinite, with K = 2 mu_a and S = 3/4 mu_s' (Star et al. 1988).
     """
     tissue = 0.244 + 85.3 * np.exp(-(WAVELENGTH_NM - 154.0) / 66.2)
     melanin = 6.6e11 * WAVELENGTH_NM**-3.33
@@ -46,14 +43,13 @@ def skin_body_reflectance(*, melanin_share: float, blood_share: float, oxygenati
     dermis = blood_share * blood + _WATER_SHARE * water_absorption_per_cm() + (1.0 - blood_share) * tissue
     scattering = 46.0 * (WAVELENGTH_NM / 500.0) ** -1.421
     epidermis = melanin_share * melanin + (1.0 - melanin_share) * tissue
-    twice_through = np.exp(-2.0 * _DIFFUSE_PATH * _EPIDERMIS_CM * epidermis)
-    return np.asarray(twice_through * layer_reflectance(2.0 * dermis, 0.75 * scattering))
+    base = layer_reflectance(2.0 * dermis, 0.75 * scattering)
+    return layer_over(base, 2.0 * epidermis, 0.75 * scattering, thickness_cm=_EPIDERMIS_CM)
 
 
 @cache
 def _haemoglobin(oxygenation: float) -> Array:
     """Return the decadic molar extinction [cm^-1 (mol / l)^-1] at WAVELENGTH_NM."""
-    text = resources.files("fullwell.assets.materials").joinpath("data", "haemoglobin.json").read_text(encoding="utf-8")
-    table = json.loads(text)["tables"]["per_cm_per_mol_per_l"]
+    table = material_table("haemoglobin")["tables"]["per_cm_per_mol_per_l"]
     mixed = oxygenation * np.array(table["oxygenated"]) + (1.0 - oxygenation) * np.array(table["deoxygenated"])
     return np.interp(WAVELENGTH_NM, table["wavelength_nm"], mixed)

@@ -10,17 +10,17 @@ __all__ = ["textile_materials"]
 
 _CLOTH: dict[str, dict[str, float]] = {
     "white": {"bleached_fibre": 1.0, "rutile": 0.05},
-    "black": {"fibre": 1.0, "black_dye": 1.0},
+    "black": {"fibre": 1.0, "black_dye": 1.6},
     "grey": {"fibre": 1.0, "black_dye": 0.09},
-    "navy": {"fibre": 1.0, "navy_dye": 1.2, "black_dye": 0.1},
-    "denim": {"fibre": 1.0, "indigo": 0.55, "black_dye": 0.015},
-    "red": {"fibre": 1.0, "red_dye": 1.2, "black_dye": 0.004},
-    "green": {"fibre": 1.0, "green_dye": 0.6, "black_dye": 0.02},
-    "yellow": {"fibre": 1.0, "yellow_dye": 0.8},
-    "beige": {"fibre": 1.0, "yellow_dye": 0.03, "red_dye": 0.015, "black_dye": 0.006},
-    "brown": {"fibre": 1.0, "yellow_dye": 0.4, "red_dye": 0.35, "black_dye": 0.12},
-    "hi_vis_yellow": {"bleached_fibre": 1.0, "yellow_dye": 1.2},
-    "hi_vis_orange": {"bleached_fibre": 1.0, "orange_dye": 1.2},
+    "navy": {"fibre": 1.0, "navy_dye": 1.2, "black_dye": 0.25},
+    "denim": {"fibre": 1.0, "indigo": 0.9, "black_dye": 0.06},
+    "red": {"fibre": 1.0, "red_dye": 2.0, "orange_dye": 0.5, "black_dye": 0.004},
+    "green": {"fibre": 1.0, "green_dye": 0.9, "black_dye": 0.04},
+    "yellow": {"fibre": 1.0, "yellow_dye": 1.2},
+    "beige": {"fibre": 1.0, "yellow_dye": 0.05, "orange_dye": 0.02, "black_dye": 0.012},
+    "brown": {"fibre": 1.0, "yellow_dye": 0.6, "orange_dye": 0.45, "black_dye": 0.2},
+    "hi_vis_yellow": {"bleached_fibre": 1.0, "yellow_dye": 2.0, "phthalo_green": 0.008},
+    "hi_vis_orange": {"bleached_fibre": 1.0, "orange_dye": 1.6},
 }
 
 
