@@ -1,5 +1,6 @@
 """Python client of the service: submit recipes, watch their frames, fetch verified products. Loads nothing heavy."""
 
+from fullwell.client.assets import Asset, AssetClient, AssetEvent, AssetPage, Import, Ingestion
 from fullwell.client.client import FullwellClient
 from fullwell.client.errors import ApiError, ApiProblem
 from fullwell.client.records import Attempt, Event, Fetched, Frame, FrameCounts, FrameDetail, Job, Product, Verdict
@@ -7,6 +8,10 @@ from fullwell.client.records import Attempt, Event, Fetched, Frame, FrameCounts,
 __all__ = [
     "ApiError",
     "ApiProblem",
+    "Asset",
+    "AssetClient",
+    "AssetEvent",
+    "AssetPage",
     "Attempt",
     "Event",
     "Fetched",
@@ -14,6 +19,8 @@ __all__ = [
     "FrameCounts",
     "FrameDetail",
     "FullwellClient",
+    "Import",
+    "Ingestion",
     "Job",
     "Product",
     "Verdict",

@@ -12,6 +12,7 @@ from typing import Any, Self
 
 import httpx
 
+from fullwell.client.assets import AssetClient
 from fullwell.client.fetching import fetch_frame
 from fullwell.client.files import collect_files
 from fullwell.client.records import (
@@ -67,6 +68,11 @@ class FullwellClient:
             timeout_s=timeout_s,
             patience_s=patience_s,
         )
+
+    @property
+    def assets(self) -> AssetClient:
+        """The asset store of the service."""
+        return AssetClient(self._transport)
 
     @property
     def base_url(self) -> str:

@@ -66,10 +66,20 @@ class Transport:
 
         self._checked(self._patiently(attempt, safe_again=True))
 
+    def post_file(self, path: str, file: Any, *, timeout_s: float) -> Any:
+        """Post a file's content, from its beginning at every try, and return the JSON of the answer."""
+
+        def attempt() -> httpx.Response:
+            file.seek(0)
+            headers = {"Content-Type": "application/octet-stream"}
+            return self._http.post(path, content=_pieces(file), headers=headers, timeout=httpx.Timeout(timeout_s, connect=10.0))
+
+        return self._checked(self._patiently(attempt, safe_again=True)).json()
+
     @contextmanager
-    def stream(self, path: str, **request: Any) -> Iterator[httpx.Response]:
+    def stream(self, path: str, *, method: str = "GET", **request: Any) -> Iterator[httpx.Response]:
         """Yield an answer whose body has not been read yet; connection errors come through to the caller."""
-        with self._http.stream("GET", path, **request) as answer:
+        with self._http.stream(method, path, **request) as answer:
             if not answer.is_success:
                 answer.read()
                 self._checked(answer)
@@ -121,7 +131,7 @@ def _error_of(answer: httpx.Response) -> FullwellError:
     detail = problem.get("detail") or f"the service answered {answer.status_code} {answer.reason_phrase}"
     if answer.status_code == httpx.codes.NOT_FOUND:
         return NotFoundError(detail)
-    if answer.status_code == httpx.codes.CONFLICT:
+    if answer.status_code in (httpx.codes.CONFLICT, httpx.codes.PRECONDITION_FAILED):
         return ConflictError(detail)
     if answer.status_code == httpx.codes.UNAUTHORIZED:
         detail = f"{detail}. Set FULLWELL_API_KEY."
