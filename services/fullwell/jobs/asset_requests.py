@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Iterable, Mapping
+import re
+import unicodedata
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
 from fullwell.assets.classes import asset_class
+from fullwell.assets.ingest.options import IngestLimits, IngestOptions
 from fullwell.assets.meshes import MODEL_SUFFIXES
-from fullwell.assets.records import LicenceRecord, check_asset_id, check_tags
-from fullwell.core import FieldError
+from fullwell.assets.records import LicenceRecord, PreparedAsset, check_asset_id, check_tags
+from fullwell.core import FieldError, sha256_hex
+from fullwell.core.settings import Settings
 from fullwell.jobs.files import check_files, relative_path
 
-__all__ = ["ARCHIVE_SUFFIXES", "AssetRequest", "main_file"]
+__all__ = ["ARCHIVE_SUFFIXES", "RESERVED_IDS", "AssetRequest", "default_asset_id", "main_file", "prepare_request"]
 
 ARCHIVE_SUFFIXES: Final = (".zip",)
 """Archives whose content is unpacked by ingestion."""
-AXES: Final = ("x", "-x", "y", "-y", "z", "-z")
+RESERVED_IDS: Final = frozenset({"archives", "classes", "export", "facets", "gc", "ingestions", "reindex", "review"})
+"""Words that stand in an id's place in the addresses of the HTTP interface."""
 MAX_TEXT: Final = 500
 
 
@@ -41,6 +45,8 @@ class AssetRequest:
         Extent along x that the asset is scaled to [m]; None keeps the file's scale.
     variant
         {USD variant set: variant}.
+    member
+        Which file of an archive is the model; needed where it holds several.
     """
 
     files: Mapping[str, str]
@@ -55,6 +61,7 @@ class AssetRequest:
     forward_axis: str = ""
     length_m: float | None = None
     variant: Mapping[str, str] = field(default_factory=dict)
+    member: str = ""
 
     def checked(self) -> AssetRequest:
         """Return the request in normal form; FieldError names the first field that is not legal."""
@@ -63,29 +70,68 @@ class AssetRequest:
         _check_texts({"title": self.title, "licence": self.licence.spdx, "attribution": self.licence.attribution})
         if not self.licence.spdx.strip():
             raise FieldError("licence is empty; must be an SPDX expression such as CC0-1.0 or CC-BY-4.0.", "licence", "")
-        if self.id:
-            check_asset_id(self.id)
-        for name in ("unit_m", "length_m"):
-            value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and 1e-6 <= value <= 1e5):
-                raise FieldError(f"{name} is {value!r}; must be in [1e-6, 1e5] m.", name, value)
-        for name in ("up_axis", "forward_axis"):
-            if getattr(self, name) not in ("", *AXES):
-                raise FieldError(
-                    f"{name} is {getattr(self, name)!r}; must be one of {', '.join(AXES)}.", name, getattr(self, name)
-                )
+        asset_id = check_asset_id(self.id) if self.id else default_asset_id(self.main or main_file(files))
+        if asset_id in RESERVED_IDS:
+            raise FieldError(f"id is {asset_id!r}, which the service's addresses use. Give another id.", "id", asset_id)
         main = main_file(files, self.main)
-        return replace(self, files=files, main=main, tags=check_tags(self.tags))
+        checked = replace(self, files=files, main=main, id=asset_id, tags=check_tags(self.tags))
+        checked.options()  # what ingestion would refuse is refused now
+        return checked
 
     def to_json(self) -> str:
         """Return the request as JSON that `from_json` reads."""
         return json.dumps(asdict(self), sort_keys=True)
+
+    def options(self) -> IngestOptions:
+        """Return what ingestion is told beside the files."""
+        return IngestOptions(
+            id=self.id,
+            asset_class=self.asset_class,
+            title=self.title,
+            tags=self.tags,
+            licence=self.licence,
+            source_name=PurePosixPath(self.main).name,
+            unit_m=self.unit_m,
+            length_m=self.length_m,
+            up_axis=self.up_axis or None,  # type: ignore[arg-type] # checked there
+            forward_axis=self.forward_axis or None,  # type: ignore[arg-type] # checked there
+            member=self.member,
+            variants=dict(self.variant),
+        )
 
     @classmethod
     def from_json(cls, text: str) -> AssetRequest:
         """Return the request that `to_json` wrote."""
         given: dict[str, Any] = json.loads(text)
         return cls(**given | {"licence": LicenceRecord(**given["licence"]), "tags": tuple(given["tags"])})
+
+
+def prepare_request(
+    request: AssetRequest, folder: Path, settings: Settings, *, progress: Callable[[float, str], None] | None = None
+) -> PreparedAsset:
+    """Return the asset that a checked request asks for, from its files in `folder`: read in a child process, under limits.
+
+    Raises
+    ------
+    IngestError
+        The files are not acceptable, or a limit was passed. Nothing is left behind.
+    """
+    from fullwell.assets.ingest import prepare_in_child  # noqa: PLC0415 - loads what reads models
+
+    limits = IngestLimits(
+        memory_bytes=settings.ingest_memory_bytes,
+        cpu_s=settings.ingest_time_limit_s,
+        wall_s=settings.ingest_time_limit_s * 1.5,
+        input_bytes=settings.max_upload_bytes,
+    )
+    return prepare_in_child(folder, request.main, request.options(), limits=limits, progress=progress)
+
+
+def default_asset_id(name: str) -> str:
+    """Return the id that a file's name stands for: "Old Cars/Red Car (1).glb" is "red-car-1"."""
+    folded = unicodedata.normalize("NFKD", PurePosixPath(name).stem).encode("ascii", "ignore").decode().casefold()
+    plain = re.sub(r"[^a-z0-9._]+", "-", folded).strip("-._")[:80].strip("-._")
+    return plain if plain and plain not in RESERVED_IDS else f"asset-{plain or sha256_hex(name.encode())[:8]}"
 
 
 def main_file(names: Iterable[str], given: str = "") -> str:

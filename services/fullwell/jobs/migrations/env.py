@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from alembic import context
 
-from fullwell.jobs.models import Base
+from fullwell.jobs.asset_rows import Base  # by way of the asset tables, which are Base's too
 
 if __name__ == "env_py":
     context.configure(
