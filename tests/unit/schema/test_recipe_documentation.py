@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from assets_in_memory import MemoryAssets, small_car
 from fullwell.schema import apply_override, load_recipe, validate
 from fullwell.schema.reading import parse_text
 from fullwell.schema.v1.recipe import json_schema
@@ -39,7 +40,7 @@ def test_every_fragment_of_the_documentation_is_legal(fragment: str, tmp_path: P
     recipe["scene"]["materials"] = oak
     value = parse_text(fragment)
     apply_override(recipe, _place(fragment), value if _place(fragment) != "scene.materials" else oak | value)
-    validate(load_recipe(recipe), base_dir=tmp_path)
+    validate(load_recipe(recipe), base_dir=tmp_path, assets=MemoryAssets(small_car("sedan-01"), folder=tmp_path))
 
 
 def test_the_committed_json_schema_has_the_definitions_of_the_documents() -> None:
