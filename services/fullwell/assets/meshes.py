@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +25,7 @@ from fullwell.assets.model import (
     linear_to_srgb,
 )
 from fullwell.assets.preflight import PREFLIGHT, ConfinedFiles
-from fullwell.assets.surfaces import surface_of
+from fullwell.assets.surfaces import TextureMemo, surface_of
 from fullwell.core.errors import FieldError, unknown_name_message
 
 if TYPE_CHECKING:
@@ -36,6 +38,8 @@ _USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 
 MODEL_SUFFIXES: tuple[str, ...] = (*_UP_BY_SUFFIX, *_USD_SUFFIXES)
 """File name endings that `load_model` reads, lower case."""
+
+MAX_SUBDIVISION = 2
 
 _MAX_SOLID_COLOURS = 64
 """Vertex colours are kept by splitting a part into one-coloured ones up to this number; beyond it their mean is used."""
@@ -50,6 +54,10 @@ def load_model(
     root: Path | None = None,
     max_triangles: int = 20_000_000,
     max_bytes: int = 2_000_000_000,
+    by_object: bool = False,
+    variants: Mapping[str, str] | None = None,
+    subdivide: int = 0,
+    isolated: bool = False,
 ) -> LoadedModel:
     """Return the triangles and materials of a model file, checked, in metres, z up.
 
@@ -70,22 +78,33 @@ def load_model(
         which are made to share folders, may also climb with relative paths (see `usd.default_root`).
     max_triangles, max_bytes
         Refused above.
+    by_object
+        Name parts after the nodes of a glTF file instead of its meshes, and split an OBJ file by its objects (or groups, where
+        it has no objects) as well as by material: "wheel_front_left/rubber".
+    variants
+        {name of a variant set, or "/prim/path{name}" for one prim's: choice} in place of a USD stage's own choices.
+    subdivide
+        Levels, 0 to 2, by which USD subdivision surfaces are refined; 0 draws their control meshes.
+    isolated
+        The caller's process is one that may die: damaged binary USD layers are read without trying them in another first.
 
     Raises
     ------
     ModelError
         The file is missing, damaged, empty, too large, of another format, or refers to files outside `root` or on the network.
     FieldError
-        unit_m or up_axis is outside its range.
+        unit_m, up_axis or subdivide is outside its range.
     """
+    if not 0 <= subdivide <= MAX_SUBDIVISION:
+        raise FieldError(f"subdivide is {subdivide}; must be 0 to {MAX_SUBDIVISION} levels.", path="subdivide", value=subdivide)
     _check_overrides(unit_m=unit_m, up_axis=up_axis, field_path=field_path)
-    source = ModelSource(file, field_path, max_triangles, max_bytes, root)
+    source = ModelSource(file, field_path, max_triangles, max_bytes, root, isolated)
     suffix = _checked_suffix(source)
     if suffix in _USD_SUFFIXES:
         from fullwell.assets.usd import read_usd  # noqa: PLC0415  (usd-core is an extra and slow to import)
 
-        stage = read_usd(source)
-        return finish_model(
+        stage = read_usd(source, variants=variants or {}, subdivide=subdivide)
+        model = finish_model(
             source,
             stage.parts,
             unit_m=stage.unit_m if unit_m is None else unit_m,
@@ -93,11 +112,18 @@ def load_model(
             warnings=stage.warnings,
             references=stage.references,
         )
+        return replace(
+            model,
+            states_unit=stage.states_unit,
+            states_up_axis=stage.states_up_axis,
+            variants=stage.variants,
+            subdivision_meshes=stage.subdivision_meshes,
+        )
     warnings: list[str] = []
     files = ConfinedFiles(source, warnings)
     # NaN and overflow in a file are found by the checks afterwards, not by warnings on the way.
     with np.errstate(all="ignore"):
-        drafts = _read_with_trimesh(source, suffix, files, warnings)
+        drafts = _read_with_trimesh(source, suffix, files, warnings, by_object=by_object)
     chosen_up = _UP_BY_SUFFIX[suffix] if up_axis is None else up_axis
     if suffix not in (".glb", ".gltf"):
         assumed = ["1 m per unit"] * (unit_m is None) + [f"{chosen_up} up"] * (up_axis is None)
@@ -106,7 +132,7 @@ def load_model(
                 f"{file.name}: the format states neither unit nor up axis; {' and '.join(assumed)} assumed. "
                 "Set unit_m and up_axis."
             )
-    return finish_model(
+    model = finish_model(
         source,
         drafts,
         unit_m=1.0 if unit_m is None else unit_m,
@@ -114,6 +140,8 @@ def load_model(
         warnings=warnings,
         references=files.read_files,
     )
+    stated = suffix in (".glb", ".gltf")
+    return replace(model, states_unit=stated, states_up_axis=stated)
 
 
 def _check_overrides(*, unit_m: float | None, up_axis: str | None, field_path: str) -> None:
@@ -156,29 +184,50 @@ def _missing_problem(file: Path) -> str:
     return f"does not exist in {file.parent}{hint}"
 
 
-def _read_with_trimesh(source: ModelSource, suffix: str, files: ConfinedFiles, warnings: list[str]) -> list[PartDraft]:
+@dataclass(slots=True, eq=False)
+class _Placed:
+    """A mesh with its transform into the file's world, and the names of the things it belongs to."""
+
+    name: str
+    mesh: Trimesh
+    transform: NDArray[np.float64]
+
+
+@dataclass(slots=True, eq=False)
+class _Surfaces:
+    """What reading materials needs: where warnings go, and the textures that are decoded already."""
+
+    source: ModelSource
+    warnings: list[str]
+    textures: TextureMemo = field(default_factory=dict)
+
+
+def _read_with_trimesh(
+    source: ModelSource, suffix: str, files: ConfinedFiles, warnings: list[str], *, by_object: bool
+) -> list[PartDraft]:
     content = source.file.read_bytes()
     # Cheap checks of headers first: a damaged count must not make the parser reserve memory for it.
     check: Callable[[ModelSource, bytes, ConfinedFiles], bytes] = PREFLIGHT[suffix]
     content = check(source, content, files)
-    meshes = _trimesh_meshes(source, suffix, content, files)
+    placed = _trimesh_meshes(source, suffix, content, files, by_object=by_object)
     if files.refusal is not None:
         raise files.refusal
     drafts: list[PartDraft] = []
     triangles = 0
-    for name, mesh, transform in meshes:
-        triangles += len(mesh.faces)
+    surfaces = _Surfaces(source, warnings)
+    for item in placed:
+        triangles += len(item.mesh.faces)
         if triangles > source.max_triangles:
             raise source.error(
                 f"holds more than {source.max_triangles} triangles", "Simplify the model, or raise max_triangles"
             )
-        drafts.extend(_drafts_of(source, name, mesh, transform, warnings))
+        drafts.extend(_drafts_of(surfaces, item))
     return drafts
 
 
 def _trimesh_meshes(
-    source: ModelSource, suffix: str, content: bytes, files: ConfinedFiles
-) -> list[tuple[str, Trimesh, NDArray[np.float64]]]:
+    source: ModelSource, suffix: str, content: bytes, files: ConfinedFiles, *, by_object: bool
+) -> list[_Placed]:
     """Every placed mesh with its transform into the file's world; points and lines are left out."""
     import io  # noqa: PLC0415
 
@@ -187,20 +236,20 @@ def _trimesh_meshes(
     except ImportError as missing:
         raise source.error("needs the package trimesh to be read", "Install fullwell[render]") from missing
 
+    options: dict[str, Any] = {"merge_primitives": False} if suffix in (".glb", ".gltf") else {}
+    if suffix == ".obj" and by_object:
+        options = _obj_splits(content)
     try:
         scene: Any = trimesh.load_scene(
-            io.BytesIO(content),
-            file_type=suffix[1:],
-            resolver=files.resolver(),
-            process=False,
-            **({"merge_primitives": False} if suffix in (".glb", ".gltf") else {}),
+            io.BytesIO(content), file_type=suffix[1:], resolver=files.resolver(), process=False, **options
         )
         placed = []
-        for node in sorted(scene.graph.nodes_geometry):
+        for node in sorted(scene.graph.nodes_geometry, key=lambda name: _node_order(scene, name)):
             transform, geometry_name = scene.graph[node]
             mesh = scene.geometry[geometry_name]
             if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
-                placed.append((geometry_name, mesh, np.asarray(transform, dtype=np.float64)))
+                name = _object_name(scene, node, geometry_name, mesh) if by_object else geometry_name
+                placed.append(_Placed(name, mesh, np.asarray(transform, dtype=np.float64)))
         return placed
     except ModelError:
         raise
@@ -208,15 +257,55 @@ def _trimesh_meshes(
         raise source.error("needs more memory than there is", "Simplify the model") from error
     except Exception as error:
         # The parser is fed damaged files here and answers with whatever its arithmetic raised.
-        said = f"{type(error).__name__}: {error}".strip().splitlines()[0][:200]
+        said = (f"{type(error).__name__}: {error}".strip().splitlines() or [""])[0][:200]
         raise source.error(
             f"is damaged or not really {suffix} ({said})", "Open it in another program, or export it again"
         ) from error
 
 
-def _drafts_of(
-    source: ModelSource, name: str, mesh: Trimesh, transform: NDArray[np.float64], warnings: list[str]
-) -> list[PartDraft]:
+def _stated_node(scene: Any, node: str, geometry_name: str) -> str:
+    """The node that the file states: of several primitives each has a node below it, with six random characters."""
+    parent = scene.graph.transforms.parents.get(node)
+    return str(parent) if parent is not None and _made_node(node, str(parent)) else node
+
+
+def _made_node(node: str, parent: str) -> bool:
+    return node.startswith(parent + "_") and len(node) == len(parent) + 7
+
+
+def _node_order(scene: Any, node: str) -> tuple[str, str]:
+    """Order of nodes that does not depend on the random names that some are given."""
+    geometry_name = scene.graph[node][1]
+    return _stated_node(scene, node, geometry_name), geometry_name
+
+
+def _object_name(scene: Any, node: str, geometry_name: str, mesh: Trimesh) -> str:
+    """Name by object: a node's, with the material behind it where the node has several; else the mesh's."""
+    stated = _stated_node(scene, node, geometry_name)
+    if stated == node and (node.isdigit() or node == geometry_name):
+        return geometry_name
+    material = str(getattr(getattr(mesh.visual, "material", None), "name", None) or "")
+    if stated == node:
+        return node
+    base = geometry_name if stated.isdigit() else stated
+    return f"{base}/{material}" if material else base
+
+
+_OBJ_OBJECT = re.compile(rb"^o[ \t]+(\S[^\r\n]*)", re.MULTILINE)
+_OBJ_GROUP = re.compile(rb"^g[ \t]+(\S[^\r\n]*)", re.MULTILINE)
+_MAX_OBJ_OBJECTS = 500
+
+
+def _obj_splits(content: bytes) -> dict[str, Any]:
+    """Options for trimesh: split by objects where there are several, else by groups where there are several."""
+    objects = set(_OBJ_OBJECT.findall(content))
+    if objects:
+        return {"split_objects": 1 < len(objects) <= _MAX_OBJ_OBJECTS}
+    return {"split_groups": 1 < len(set(_OBJ_GROUP.findall(content))) <= _MAX_OBJ_OBJECTS}
+
+
+def _drafts_of(surfaces: _Surfaces, placed: _Placed) -> list[PartDraft]:
+    mesh, transform = placed.mesh, placed.transform
     vertices, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
     linear = transform[:3, :3]
     normals = _file_normals(mesh)
@@ -231,10 +320,10 @@ def _drafts_of(
                 [np.cross(linear[1], linear[2]), np.cross(linear[2], linear[0]), np.cross(linear[0], linear[1])]
             )
             normals = normals @ cofactors.T * (-1.0 if mirrored else 1.0)
-    surface, uv = surface_of(source, name, mesh, warnings)
-    draft = PartDraft(name, vertices, faces, normals, uv, surface)
+    surface, uv = surface_of(surfaces.source, placed.name, mesh, surfaces.warnings, surfaces.textures)
+    draft = PartDraft(placed.name, vertices, faces, normals, uv, surface)
     colours = _vertex_colours(mesh)
-    return [draft] if colours is None else _split_by_colour(source, draft, colours, warnings)
+    return [draft] if colours is None else _split_by_colour(surfaces.source, draft, colours, surfaces.warnings)
 
 
 def _file_normals(mesh: Trimesh) -> NDArray[np.float64] | None:

@@ -22,9 +22,11 @@ __all__ = [
     "PartDraft",
     "SurfaceDraft",
     "UpAxis",
+    "VariantSet",
     "finish_model",
     "linear_to_srgb",
     "srgb_to_linear",
+    "turn_up",
 ]
 
 UpAxis = Literal["x", "y", "z"]
@@ -36,6 +38,8 @@ MAX_COORDINATE_M = 1e6
 UNUSUAL_EXTENT_M = (0.005, 200.0)
 """Largest extents outside this range are legal, but are most often a wrong unit; they give a warning."""
 
+_MAX_NAME = 200
+
 _DEGENERATE_RELATIVE_AREA = 1e-12
 """Twice the area over the squared longest edge: below it a triangle has no usable normal in float32."""
 
@@ -46,13 +50,18 @@ class ModelError(AssetError, FieldError):
 
 @dataclass(frozen=True, slots=True)
 class ModelSource:
-    """Which file is read, for which field, and within which limits. `root` bounds what the file may refer to."""
+    """Which file is read, for which field, and within which limits.
+
+    `root` bounds what the file may refer to. `isolated`: the process is a child with limits already, so that a reader which may
+    die needs no further one.
+    """
 
     file: Path
     field_path: str
     max_triangles: int
     max_bytes: int
     root: Path | None = None
+    isolated: bool = False
 
     def error(self, problem: str, next_step: str) -> ModelError:
         """Return the error that says what is wrong with the file and what to do about it."""
@@ -82,6 +91,8 @@ class LoadedPart:
         sRGB-encoded relative emission, or None. Model files carry no usable absolute unit; the recipe sets the radiance.
     double_sided
         Whether the back is meant to be seen.
+    material_name
+        What the file calls the material; empty where it does not.
     """
 
     name: str
@@ -95,6 +106,17 @@ class LoadedPart:
     metallic: float
     emissive_srgb: tuple[float, float, float] | None
     double_sided: bool
+    material_name: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class VariantSet:
+    """A choice that a USD stage leaves open: at which prim, of which names, and which one was read ("" for none)."""
+
+    prim: str
+    name: str
+    choices: tuple[str, ...]
+    selected: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,6 +136,14 @@ class LoadedModel:
     references
         The other files that were read or are referred to (layers, materials, textures, buffers), sorted: the model is the
         same as long as the file and these are.
+    states_unit, states_up_axis
+        Whether the file or its format says them; where not, they were given or assumed.
+    removed_triangles
+        Triangles without an area that were left out.
+    variants
+        What a USD stage could also look like.
+    subdivision_meshes
+        Meshes that are control meshes of subdivision surfaces; as many levels as were asked for have been applied.
     """
 
     parts: tuple[LoadedPart, ...]
@@ -122,6 +152,11 @@ class LoadedModel:
     up_axis: UpAxis
     warnings: tuple[str, ...]
     references: tuple[Path, ...] = ()
+    states_unit: bool = True
+    states_up_axis: bool = True
+    removed_triangles: int = 0
+    variants: tuple[VariantSet, ...] = ()
+    subdivision_meshes: int = 0
 
     @property
     def triangle_count(self) -> int:
@@ -139,6 +174,7 @@ class SurfaceDraft:
     metallic: float = 0.0
     emissive_srgb: tuple[float, float, float] | None = None
     double_sided: bool = True
+    name: str = ""
 
 
 @dataclass(slots=True, eq=False)
@@ -186,7 +222,7 @@ def finish_model(
             f"holds {total} triangles; at most {source.max_triangles} are allowed", "Simplify the model, or raise max_triangles"
         )
     with np.errstate(all="ignore"):
-        parts, removed = _finished_parts(source, drafts, to_world=unit_m * _turn_up(up_axis), notes=notes)
+        parts, removed = _finished_parts(source, drafts, to_world=unit_m * turn_up(up_axis), notes=notes)
     if removed:
         notes.append(f"{source.file.name}: {removed} of {total} triangles have no area and were removed.")
     if not parts:
@@ -199,10 +235,10 @@ def finish_model(
     )
     notes.extend(_size_warnings(source, bounds_m, unit_m=unit_m))
     others = tuple(sorted(set(references)))
-    return LoadedModel(tuple(parts), bounds_m, unit_m, up_axis, tuple(dict.fromkeys(notes)), others)
+    return LoadedModel(tuple(parts), bounds_m, unit_m, up_axis, tuple(dict.fromkeys(notes)), others, removed_triangles=removed)
 
 
-def _turn_up(up_axis: UpAxis) -> NDArray[np.float64]:
+def turn_up(up_axis: UpAxis) -> NDArray[np.float64]:
     """(3, 3) rotation that turns the file's up axis to +z: y up maps (x, y, z) to (x, -z, y), x up maps it to (-z, y, x)."""
     if up_axis == "y":
         return np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
@@ -232,7 +268,7 @@ def _finished_parts(
             )
         parts.append(
             LoadedPart(
-                name=_unique(draft.name or "part", names),
+                name=_unique(_clean(draft.name) or "part", names),
                 vertices_m=vertices_m,
                 faces=compact.reshape(faces.shape).astype(np.uint32),
                 normals=_usable_normals(source, draft, used, turn=to_world / np.linalg.norm(to_world[0]), notes=notes),
@@ -243,6 +279,7 @@ def _finished_parts(
                 metallic=_fraction(draft.surface.metallic, 0.0),
                 emissive_srgb=None if draft.surface.emissive_srgb is None else _colour(draft.surface.emissive_srgb),
                 double_sided=draft.surface.double_sided,
+                material_name=_clean(draft.surface.name),
             )
         )
     return parts, removed
@@ -304,6 +341,12 @@ def _usable_uv(
     notes.append(f"{source.file.name}: the texture coordinates of part {draft.name!r} are unusable; its mean colour is used.")
     draft.surface.base_color_texture = None
     return None
+
+
+def _clean(name: str) -> str:
+    """Return a name that every document and file can hold: no control characters, no half surrogates, not endless."""
+    text = name.encode("utf-8", "replace").decode()
+    return "".join(character for character in text if character.isprintable()).strip()[:_MAX_NAME]
 
 
 def _unique(name: str, names: set[str]) -> str:

@@ -10,29 +10,45 @@ from numpy.typing import NDArray
 
 from fullwell.assets.model import ModelSource, SurfaceDraft, linear_to_srgb, srgb_to_linear
 
-__all__ = ["MAX_TEXTURE_PIXELS", "mean_srgb", "pixels_of", "surface_of", "tinted"]
+__all__ = ["MAX_TEXTURE_PIXELS", "TextureMemo", "mean_srgb", "pixels_of", "surface_of", "tinted"]
 
 MAX_TEXTURE_PIXELS = 16384 * 16384
 """Larger textures are refused: they are most often a decompression bomb, and take a gigabyte."""
 
 
+TextureMemo = dict[tuple[int, tuple[float, ...]], tuple[Any, NDArray[np.uint8]]]
+"""{(identity of an image, colour factor): the image, which keeps the identity its own, and its pixels}."""
+
+
 def surface_of(
-    source: ModelSource, name: str, mesh: Any, warnings: list[str]
+    source: ModelSource, name: str, mesh: Any, warnings: list[str], textures: TextureMemo
 ) -> tuple[SurfaceDraft, NDArray[np.float64] | None]:
-    """Return the material and the per-vertex texture coordinates (v up) of a trimesh mesh."""
+    """Return the material and the per-vertex texture coordinates (v up) of a trimesh mesh.
+
+    `textures` holds what was decoded before, so that parts which share an image share its pixels.
+    """
     visual = mesh.visual
     material = getattr(visual, "material", None)
     uv = getattr(visual, "uv", None)
     coordinates = None if uv is None else np.asarray(uv, dtype=np.float64)[:, :2]
     if material is None or visual.kind != "texture":
         return SurfaceDraft(), coordinates
-    kind = type(material).__name__
-    if kind == "PBRMaterial":
-        return _metallic_roughness(source, name, material, warnings), coordinates
-    return _wavefront(source, name, material, warnings), coordinates
+    read = _metallic_roughness if type(material).__name__ == "PBRMaterial" else _wavefront
+    surface = read(source, name, material, warnings, textures)
+    surface.name = str(getattr(material, "name", None) or "")
+    return surface, coordinates
 
 
-def _metallic_roughness(source: ModelSource, name: str, material: Any, warnings: list[str]) -> SurfaceDraft:
+def _texture(source: ModelSource, image: Any, factor: NDArray[np.float64], textures: TextureMemo) -> NDArray[np.uint8]:
+    key = (id(image), tuple(factor.tolist()))
+    if key not in textures:
+        textures[key] = (image, tinted(pixels_of(source, image), factor))
+    return textures[key][1]
+
+
+def _metallic_roughness(
+    source: ModelSource, name: str, material: Any, warnings: list[str], textures: TextureMemo
+) -> SurfaceDraft:
     """glTF 2.0, section 3.9.2: factors are linear, the base colour texture is sRGB and is multiplied by its factor."""
     factor = _linear_factor(material.baseColorFactor)
     surface = SurfaceDraft(
@@ -42,7 +58,7 @@ def _metallic_roughness(source: ModelSource, name: str, material: Any, warnings:
         double_sided=bool(material.doubleSided),
     )
     if material.baseColorTexture is not None:
-        surface.base_color_texture = tinted(pixels_of(source, material.baseColorTexture), factor)
+        surface.base_color_texture = _texture(source, material.baseColorTexture, factor, textures)
         surface.base_color_srgb = mean_srgb(surface.base_color_texture)
     if material.metallicRoughnessTexture is not None:
         # Green holds roughness and blue metallic (glTF 2.0, 3.9.2); the renderer takes one number of each.
@@ -69,7 +85,7 @@ def _linear_factor(stated: Any) -> NDArray[np.float64]:
     return factor[:3].astype(np.float64) / scale
 
 
-def _wavefront(source: ModelSource, name: str, material: Any, warnings: list[str]) -> SurfaceDraft:
+def _wavefront(source: ModelSource, name: str, material: Any, warnings: list[str], textures: TextureMemo) -> SurfaceDraft:
     """MTL: Kd is a (linear) reflectance, as the format says and Blender writes; Ns, a Blinn exponent, becomes a roughness.
 
     alpha^2 = 2 / (Ns + 2) for a microfacet distribution of the same width (Walter et al. 2007, sec. 5.2), and
@@ -91,7 +107,7 @@ def _wavefront(source: ModelSource, name: str, material: Any, warnings: list[str
     image = getattr(material, "image", None)
     if image is not None:
         # Writers leave Kd at 0 or 1 beside a texture as they please; the texture is taken as it is, like most readers do.
-        surface.base_color_texture = pixels_of(source, image)
+        surface.base_color_texture = _texture(source, image, np.ones(3), textures)
         surface.base_color_srgb = mean_srgb(surface.base_color_texture)
     emission = _numbers(stated.get("ke"), 3)
     if emission and any(emission):

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import io
 import struct
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fullwell.assets.model import ModelSource, PartDraft, SurfaceDraft, UpAxis, linear_to_srgb
+from fullwell.assets.model import ModelSource, PartDraft, SurfaceDraft, UpAxis, VariantSet, linear_to_srgb
 from fullwell.assets.preflight import confined_path
 from fullwell.assets.surfaces import mean_srgb, pixels_of, tinted
 from fullwell.assets.usd_probe import first_line, layer_references, needs_probe, probe, remember_survivor
+from fullwell.core.errors import unknown_name_message
 
 __all__ = ["UsdStage", "default_root", "read_usd"]
 
@@ -32,6 +33,10 @@ class UsdStage:
     up_axis: UpAxis
     warnings: tuple[str, ...]
     references: tuple[Path, ...]
+    states_unit: bool
+    states_up_axis: bool
+    variants: tuple[VariantSet, ...]
+    subdivision_meshes: int
 
 
 @dataclass(slots=True, eq=False)
@@ -40,6 +45,9 @@ class _Reading:
 
     source: ModelSource
     root: Path
+    wanted: Mapping[str, str] = field(default_factory=dict)
+    subdivide: int = 0
+    subdivision_meshes: int = 0
     warnings: list[str] = field(default_factory=list)
     surfaces: dict[str, SurfaceDraft] = field(default_factory=dict)
     references: set[Path] = field(default_factory=set)
@@ -63,11 +71,22 @@ def default_root(file: Path) -> Path:
     return folder
 
 
-def read_usd(source: ModelSource) -> UsdStage:
-    """Return all visible meshes of a stage at its default time, with default variants and all payloads.
+def read_usd(source: ModelSource, *, variants: Mapping[str, str] | None = None, subdivide: int = 0) -> UsdStage:
+    """Return all visible meshes of a stage at its default time, with all payloads and instances.
 
-    Purposes "default" and "render" are read; "proxy" and "guide" are not. Subdivision surfaces are drawn as their control
-    mesh. Raises ModelError for damaged layers, missing references, and references outside the root.
+    Purposes "default" and "render" are read; "proxy" and "guide" are not.
+
+    Parameters
+    ----------
+    variants
+        {name of a variant set, or "/prim/path{name}": choice} in place of the stage's own choices.
+    subdivide
+        Levels by which subdivision surfaces are refined; with 0 they are drawn as their control mesh.
+
+    Raises
+    ------
+    ModelError
+        Damaged layers, missing references, references outside the root, variants that the stage does not have.
     """
     try:
         from pxr import Tf, UsdUtils  # noqa: PLC0415  (an extra)
@@ -75,7 +94,8 @@ def read_usd(source: ModelSource) -> UsdStage:
         raise source.error("needs the package usd-core to be read", "Install fullwell[render]") from missing
     # USD writes what it finds wrong to the terminal; the delegate collects it instead.
     delegate = UsdUtils.CoalescingDiagnosticDelegate()
-    reading = _Reading(source, default_root(source.file) if source.root is None else source.root)
+    root = default_root(source.file) if source.root is None else source.root
+    reading = _Reading(source, root, wanted=variants or {}, subdivide=subdivide)
     try:
         # NaN and overflow in a file are found by the checks afterwards, not by warnings on the way.
         with np.errstate(all="ignore"):
@@ -119,7 +139,7 @@ def _read_stage(reading: _Reading) -> UsdStage:
     _check_crate(reading.source)
     for reference in layer_references(reading.source.file):
         confined_path(reading.source, reference, base=reading.source.file.resolve().parent, root=reading.root)
-    if needs_probe(reading.source.file):
+    if not reading.source.isolated and needs_probe(reading.source.file):
         probe(reading.source)
     layer = Sdf.Layer.FindOrOpen(file)
     if layer is None:
@@ -128,20 +148,77 @@ def _read_stage(reading: _Reading) -> UsdStage:
     layer.Reload()
     _check_references(reading, file)
     stage = Usd.Stage.Open(layer, Usd.Stage.LoadAll)
+    variants = _choose_variants(reading, stage)
     for error in stage.GetCompositionErrors():
         # A connection to a prim outside its reference loses a material input; anything else loses geometry.
         if "target path" not in str(error):
             raise reading.source.error(f"cannot be composed ({first_line(error)})", "Repair its references")
         reading.warn(first_line(error))
     unit_m = float(UsdGeom.GetStageMetersPerUnit(stage))
-    if not stage.HasAuthoredMetadata(UsdGeom.Tokens.metersPerUnit):
+    states_unit = bool(stage.HasAuthoredMetadata(UsdGeom.Tokens.metersPerUnit))
+    if not states_unit:
         reading.warn(f"the layer states no metersPerUnit; USD's default of {unit_m:g} m is taken. Set unit_m.")
     if not (np.isfinite(unit_m) and unit_m > 0):
         raise reading.source.error(f"states metersPerUnit = {unit_m}; must be > 0", "Set unit_m")
     parts = tuple(_parts_of(reading, stage))
     remember_survivor(reading.source.file, reading.references)
     up_axis: UpAxis = "z" if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else "y"
-    return UsdStage(parts, unit_m, up_axis, tuple(reading.warnings), tuple(reading.references))
+    return UsdStage(
+        parts,
+        unit_m,
+        up_axis,
+        tuple(reading.warnings),
+        tuple(reading.references),
+        states_unit,
+        bool(stage.HasAuthoredMetadata(UsdGeom.Tokens.upAxis)),
+        variants,
+        reading.subdivision_meshes,
+    )
+
+
+_MAX_VARIANT_PASSES = 8
+"""A choice may bring further variant sets to light; deeper nesting than this is not followed."""
+
+
+def _choose_variants(reading: _Reading, stage: Any) -> tuple[VariantSet, ...]:
+    """Make the wanted choices in the session layer, and return every variant set of the stage as it is then."""
+    from pxr import Usd  # noqa: PLC0415
+
+    stage.SetEditTarget(Usd.EditTarget(stage.GetSessionLayer()))
+    used: set[str] = set()
+    for _ in range(_MAX_VARIANT_PASSES):
+        found = _variant_sets(stage)
+        changes = 0
+        for entry in found:
+            key = next((key for key in (f"{entry.prim}{{{entry.name}}}", entry.name) if key in reading.wanted), None)
+            if key is None:
+                continue
+            used.add(key)
+            choice = reading.wanted[key]
+            if choice not in entry.choices:
+                message = unknown_name_message(f"the variant of {entry.name!r}", choice, entry.choices)
+                raise reading.source.error(f"cannot be read as asked: {message.rstrip('?.')}", "Choose one that it has")
+            if choice != entry.selected:
+                stage.GetPrimAtPath(entry.prim).GetVariantSet(entry.name).SetVariantSelection(choice)
+                changes += 1
+        if not changes:
+            break
+    unknown = sorted(set(reading.wanted) - used)
+    if unknown:
+        message = unknown_name_message("variant set", unknown[0], {entry.name for entry in found})
+        raise reading.source.error(f"cannot be read as asked: {message.rstrip('?.')}", "Choose one that it has")
+    return found
+
+
+def _variant_sets(stage: Any) -> tuple[VariantSet, ...]:
+    found = []
+    for prim in stage.TraverseAll():
+        sets = prim.GetVariantSets()
+        for name in sets.GetNames():
+            chosen = sets.GetVariantSet(name)
+            choices = tuple(sorted(map(str, chosen.GetVariantNames())))
+            found.append(VariantSet(str(prim.GetPath()), str(name), choices, str(chosen.GetVariantSelection())))
+    return tuple(found)
 
 
 def _check_references(reading: _Reading, file: str) -> None:
@@ -374,10 +451,8 @@ def _surface_of(reading: _Reading, mesh: Any, prim: Any) -> SurfaceDraft:
     key = str(material.GetPath())
     if key not in reading.surfaces:
         reading.surfaces[key] = _preview_surface(reading, material)
-    known = reading.surfaces[key]
-    return SurfaceDraft(
-        known.base_color_srgb, known.base_color_texture, known.roughness, known.metallic, known.emissive_srgb, double_sided
-    )
+        reading.surfaces[key].name = str(material.GetPath().name)
+    return replace(reading.surfaces[key], double_sided=double_sided)
 
 
 def _preview_surface(reading: _Reading, material: Any) -> SurfaceDraft:
