@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Final, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from fullwell.assets.materials.catalogue import asset_material
@@ -30,8 +31,10 @@ VIEWS: Final = 8
 PREVIEW_NAMES: Final = ("thumb", *(f"view_{number}" for number in range(VIEWS)), "turntable", "chart")
 """Pictures of an asset, each ``assets/previews/<look digest>/<name>.png`` in the store."""
 
-_VIEW_PX: Final = (288, 216)
-_SAMPLES: Final = 48
+_VIEW_PX: Final = (256, 192)
+_FINER: Final = 2
+"""Sensor pixels along each side of a picture's pixel: the mosaic of the colour filters is averaged away."""
+_SAMPLES: Final = 16
 _ELEVATION_DEG: Final = 14.0
 _FIRST_AZIMUTH_DEG: Final = 40.0
 _HFOV_DEG: Final = 32.0
@@ -132,12 +135,12 @@ def _run(
 
 
 def preview_recipe(manifest: AssetManifest) -> RecipeDocument:
-    """Return the recipe of the eight views: the asset on grey ground under a soft sky and a key light, all lamps on."""
+    """Return the recipe of the eight views: the asset on grey ground under a soft sky and a key light."""
     size = np.asarray(manifest.size_m)
     centre = [0.0, 0.0, float(size[2]) / 2]
     radius_m = float(np.linalg.norm(size)) / 2
-    distance_m = _MARGIN * _distance_m(size)
-    asset = {"kind": "asset", "id": f"{manifest.id}@{manifest.digest}", "lit": _lamps(manifest)}
+    distance_m = _distance_m(size)
+    asset = {"kind": "asset", "id": f"{manifest.id}@{manifest.digest}"}
     ground_m = max(400.0 * radius_m, 10.0)
     return _document(
         f"preview {manifest.id}"[:120],
@@ -161,20 +164,31 @@ _GROUND: Final = 0.42
 """About as bright under sky and key light as the sky is itself, so that the horizon does not show."""
 
 
-def _distance_m(size: np.ndarray[Any, Any]) -> float:
-    """Return the distance from which a box of this size fills a view, whichever way it is turned."""
-    half_angle = math.radians(_HFOV_DEG / 2)
-    aspect = _VIEW_PX[1] / _VIEW_PX[0]
-    across = float(np.hypot(size[0], size[1])) / 2
-    up = float(size[2]) / 2 * math.cos(math.radians(_ELEVATION_DEG)) + across * math.sin(math.radians(_ELEVATION_DEG))
-    return max(across / math.tan(half_angle), up / (aspect * math.tan(half_angle))) + across
+def _distance_m(size_m: NDArray[np.float64]) -> float:
+    """Return the distance [m] from which a box of this size fits into every view, as near as that allows."""
+    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * size_m
+    tangent = math.tan(math.radians(_HFOV_DEG / 2)) / _MARGIN
+    limits = np.array([tangent, tangent * _VIEW_PX[1] / _VIEW_PX[0]])
+    needed = 0.0
+    for number in range(VIEWS):
+        towards = np.array(_direction(number))
+        right = np.cross([0.0, 0.0, 1.0], towards)
+        right /= np.linalg.norm(right)
+        aside = np.abs(corners @ np.stack([right, np.cross(towards, right)], axis=1))
+        # A corner that is nearer than the centre by `ahead` needs (distance - ahead) * limit >= aside.
+        ahead = corners @ towards
+        needed = max(needed, float((aside / limits + ahead[:, None]).max()))
+    return needed
 
 
-def _place(number: int, distance_m: float, centre: list[float]) -> list[float]:
-    azimuth = math.radians(_FIRST_AZIMUTH_DEG + 360.0 * number / VIEWS)
-    elevation = math.radians(_ELEVATION_DEG)
-    across = distance_m * math.cos(elevation)
-    return [across * math.cos(azimuth), across * math.sin(azimuth), centre[2] + distance_m * math.sin(elevation)]
+def _direction(number: int) -> tuple[float, float, float]:
+    """Return the unit vector from the asset towards a view's camera."""
+    azimuth, elevation = math.radians(_FIRST_AZIMUTH_DEG + 360.0 * number / VIEWS), math.radians(_ELEVATION_DEG)
+    return math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth), math.sin(elevation)
+
+
+def _place(number: int, distance_m: float, centre_m: list[float]) -> list[float]:
+    return [middle + distance_m * towards for middle, towards in zip(centre_m, _direction(number), strict=True)]
 
 
 def _camera(name: str, origin_m: list[float], target_m: list[float]) -> dict[str, Any]:
@@ -186,8 +200,8 @@ def _camera(name: str, origin_m: list[float], target_m: list[float]) -> dict[str
             {
                 "name": "main",
                 "model": "ideal-rgb",
-                "cols": _VIEW_PX[0],
-                "rows": _VIEW_PX[1],
+                "cols": _FINER * _VIEW_PX[0],
+                "rows": _FINER * _VIEW_PX[1],
                 # A white sheet that faces the key light stays below the full well.
                 "exposure": {"time_s": _EXPOSURE_S},
             }
@@ -195,7 +209,7 @@ def _camera(name: str, origin_m: list[float], target_m: list[float]) -> dict[str
     }
 
 
-_EXPOSURE_S: Final = 0.012
+_EXPOSURE_S: Final = 0.026
 
 
 def _document(name: str, *, objects: list[Any], cameras: list[Any], samples: int) -> RecipeDocument:
@@ -218,15 +232,10 @@ def _document(name: str, *, objects: list[Any], cameras: list[Any], samples: int
             },
             "cameras": cameras,
             "outputs": ["image.png"],
-            "quality": {"samples_per_pixel": samples, "max_depth": 6},
+            # Glints of lamps and key light on polished parts, seen by way of the ground, would need thousands of samples.
+            "quality": {"samples_per_pixel": samples, "max_depth": 5, "max_sample_saturation": 1.5},
         }
     )
-
-
-def _lamps(manifest: AssetManifest) -> list[str]:
-    """Return the names of the parts to light: at most 64, which is what a recipe takes."""
-    choices = [(part.name, part.material.name) for part in manifest.parts]
-    return [name for name, material in choices if material and asset_material(material).lamp is not None][:64]
 
 
 # Materials -----------------------------------------------------------------------------------------------------------
@@ -261,8 +270,8 @@ def materials_recipe(manifest: AssetManifest) -> RecipeDocument | None:
     middle = -(len(choices) - 1) / 2
     camera = _camera("main", [1000.0, 0.0, middle], [0.0, 0.0, middle])
     camera["lens"]["hfov_deg"] = math.degrees(2 * math.atan(0.5 / 1000.0))
-    camera["sensors"][0] |= {"cols": _BALLS_PX, "rows": _BALLS_PX * len(choices)}
-    return _document(f"materials {manifest.id}"[:120], objects=objects, cameras=[camera], samples=64)
+    camera["sensors"][0] |= {"cols": _FINER * _BALLS_PX, "rows": _FINER * _BALLS_PX * len(choices)}
+    return _document(f"materials {manifest.id}"[:120], objects=objects, cameras=[camera], samples=16)
 
 
 def _ball_material(choice: MaterialChoice) -> Any:
@@ -314,7 +323,7 @@ def _figures(choice: MaterialChoice) -> list[str]:
     material = asset_material(choice.name)
     figures = [f"roughness {material.roughness:.2f}"] if material.kind != "diffuse" else []
     if material.lamp is not None:
-        figures.append(f"lamp: {material.lamp.luminance_cd_m2:,.0f} cd/m²".replace(",", " "))
+        figures.append(f"lamp: {material.lamp.luminance_cd_m2:,.0f} cd/m2".replace(",", " "))
     return figures
 
 
@@ -351,7 +360,7 @@ def _plot(pen: ImageDraw.ImageDraw, box: tuple[int, int, int, int], points: list
 
 def _picture(store: ObjectStore, key: str) -> Image.Image:
     with Image.open(io.BytesIO(store.get(key))) as picture:
-        return picture.convert("RGB")
+        return picture.convert("RGB").reduce(_FINER)
 
 
 def _sheet(views: list[Image.Image]) -> Image.Image:
