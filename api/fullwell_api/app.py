@@ -15,7 +15,7 @@ from fullwell.storage import ObjectStore
 from fullwell_api.guards import HostGuard, SizeLimit, require_key
 from fullwell_api.metrics import RequestMeter, make_metrics
 from fullwell_api.problems import PROBLEM_RESPONSES, add_problem_handlers
-from fullwell_api.routes import blobs, catalog, health, jobs, products, recipes
+from fullwell_api.routes import assets, blobs, catalog, health, jobs, products, recipes
 from fullwell_api.services import Services, make_services
 from fullwell_api.web import pages
 
@@ -37,7 +37,7 @@ def create_app(
     app.state.services = services
     app.state.metrics = make_metrics(services)
     add_problem_handlers(app)
-    for router in (jobs.router, products.router, recipes.router, blobs.router, catalog.router):
+    for router in (jobs.router, products.router, recipes.router, blobs.router, catalog.router, assets.router):
         app.include_router(router, prefix="/v1", dependencies=[Depends(require_key)], responses=PROBLEM_RESPONSES)
     app.include_router(health.router)
     app.include_router(pages.router)

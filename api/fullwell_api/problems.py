@@ -56,7 +56,7 @@ def _described(*statuses: int) -> dict[int | str, dict[str, Any]]:
     return {status: {"description": HTTPStatus(status).phrase, "model": Problem} for status in statuses}
 
 
-PROBLEM_RESPONSES = _described(401, 404, 409, 413, 422, 500, 503)
+PROBLEM_RESPONSES = _described(401, 403, 404, 409, 413, 422, 500, 503)
 """Responses that every route of the API may give, for the OpenAPI document."""
 
 _STATUS_OF: tuple[tuple[type[FullwellError], int], ...] = (
@@ -69,6 +69,7 @@ _STATUS_OF: tuple[tuple[type[FullwellError], int], ...] = (
 )
 
 _CODE_OF = {400: "bad_request", 401: "unauthorized", 403: "forbidden", 404: "not_found", 405: "method_not_allowed"} | {
+    412: "precondition_failed",
     413: "too_large",
     415: "unsupported_media_type",
     421: "misdirected_request",

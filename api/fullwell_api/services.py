@@ -10,6 +10,7 @@ from fastapi import Depends, Request
 
 from fullwell.core import FullwellError, ServiceError
 from fullwell.core.settings import Settings
+from fullwell.jobs.asset_library import AssetLibrary
 from fullwell.jobs.database import Database
 from fullwell.jobs.dispatcher import Dispatcher, DispatcherTiming
 from fullwell.jobs.ingestions import IngestionRepository
@@ -34,6 +35,7 @@ class Services:
     ingestions: IngestionRepository
     queue: TaskQueue
     store: ObjectStore
+    library: AssetLibrary
     dispatcher: Dispatcher
     threads: ThreadPoolExecutor
 
@@ -78,6 +80,7 @@ def make_services(settings: Settings, *, queue: TaskQueue | None = None, store: 
             raise ServiceError("no broker is set. Set FULLWELL_BROKER_URL, or start `fullwell serve`, which brings one.")
         queue = CeleryTaskQueue(settings, settings.broker_url)
     database = Database(settings.database)
+    objects = store or store_from_url(settings.store)
     repository = JobRepository(database)
     ingestions = IngestionRepository(database)
     timing = DispatcherTiming(interval_s=settings.reap_interval_s, lost_after_s=settings.lease_s)
@@ -90,7 +93,8 @@ def make_services(settings: Settings, *, queue: TaskQueue | None = None, store: 
         repository=repository,
         ingestions=ingestions,
         queue=queue,
-        store=store or store_from_url(settings.store),
+        store=objects,
+        library=AssetLibrary(objects, database),
         dispatcher=dispatcher,
         threads=threads,
     )

@@ -21,6 +21,7 @@ from fullwell_worker.execution import FrameRunner, Heart, patiently
 from fullwell_worker.materials import JobFolder
 
 if TYPE_CHECKING:
+    from fullwell.assets.ingest import IngestProcess
     from fullwell.assets.records import AssetManifest
     from fullwell.jobs.asset_library import AssetEntry, AssetLibrary
 
@@ -28,6 +29,8 @@ __all__ = ["AssetContext", "asset_context", "run_ingestion"]
 
 PERMANENT: Final = (FieldError, ShapeError, AssetError)
 """Errors that the same files would meet again: such an ingestion is not tried twice."""
+RETRYABLE_CAUSES: Final = ("died", "unforeseen")
+"""Ends of the reading process that need not be the files' fault: the machine may have run out of memory."""
 READ_SHARE: Final = 0.3
 """Share of the progress that reading takes; previews take the rest."""
 
@@ -44,6 +47,7 @@ class AssetContext:
     library: AssetLibrary
     store: ObjectStore
     runner: FrameRunner
+    reader: IngestProcess
 
     @property
     def rule(self) -> RetryRule:
@@ -53,9 +57,20 @@ class AssetContext:
 
 def asset_context(name: str, settings: Settings, database: Database, store: ObjectStore, runner: FrameRunner) -> AssetContext:
     """Return the context of a worker; previews are rendered by `runner`, in a process of their own where frames are."""
-    from fullwell.jobs.asset_library import AssetLibrary  # noqa: PLC0415 - at the first asset, not at the start
+    # Loaded at the first asset, not at the start.
+    from fullwell.assets.ingest import IngestProcess  # noqa: PLC0415
+    from fullwell.jobs.asset_library import AssetLibrary  # noqa: PLC0415
+    from fullwell.jobs.asset_requests import ingest_limits  # noqa: PLC0415
 
-    return AssetContext(name, settings, IngestionRepository(database), AssetLibrary(database, store), store, runner)
+    return AssetContext(
+        name=name,
+        settings=settings,
+        ingestions=IngestionRepository(database),
+        library=AssetLibrary(store, database),
+        store=store,
+        runner=runner,
+        reader=IngestProcess(ingest_limits(settings)),
+    )
 
 
 def run_ingestion(context: AssetContext, ingestion_id: str) -> None:
@@ -81,7 +96,12 @@ def run_ingestion(context: AssetContext, ingestion_id: str) -> None:
             log.info("ingestion stopped; another worker has it")
             return
         except FullwellError as error:
-            _record_failure(context, lease, str(error), error.code, retryable=not isinstance(error, PERMANENT))
+            cause = getattr(error, "cause", "")
+            if cause == "cancelled":
+                log.info("ingestion stopped; another worker has it")
+                return
+            retryable = cause in RETRYABLE_CAUSES or not isinstance(error, PERMANENT)
+            _record_failure(context, lease, str(error), error.code, retryable=retryable)
             return
         except MemoryError:
             _record_failure(context, lease, "the asset needs more memory than the worker has", "out_of_memory", retryable=True)
@@ -99,13 +119,15 @@ def _work(context: AssetContext, lease: IngestionLease, heart: Heart) -> str:
     record = context.ingestions.get(lease.id)
     if record.kind == "previews":
         assert record.stored is not None
-        manifest = context.library.get(record.stored.asset_id, version=record.stored.version).manifest
+        manifest = context.library.get(record.stored.asset_id, record.stored.version).manifest
+        # One picture less: then all are rendered, and the others stay to be seen until that is done.
+        context.store.delete(context.library.preview_key(manifest.look_digest, "chart"))
         _render(context, manifest, heart, start=0.0)
         return ""
     if record.stored is None:
         manifest = _store(context, lease, record, heart).manifest
     else:  # an earlier attempt ended after the asset was stored
-        manifest = context.library.get(record.stored.asset_id, version=record.stored.version).manifest
+        manifest = context.library.get(record.stored.asset_id, record.stored.version).manifest
     if not context.settings.preview_on_ingest:
         return ""
     try:
@@ -120,7 +142,7 @@ def _work(context: AssetContext, lease: IngestionLease, heart: Heart) -> str:
 
 
 def _store(context: AssetContext, lease: IngestionLease, record: IngestionRecord, heart: Heart) -> AssetEntry:
-    from fullwell.jobs.asset_requests import AssetRequest, prepare_request  # noqa: PLC0415
+    from fullwell.jobs.asset_requests import AssetRequest  # noqa: PLC0415
 
     request = AssetRequest.from_json(record.request_json)
     folder = JobFolder()
@@ -128,7 +150,13 @@ def _store(context: AssetContext, lease: IngestionLease, record: IngestionRecord
         heart.report_stage("fetch files", 0.0)
         base = folder.prepare(record.id, request.files, context.store)
         heart.report_stage("read and check", 0.05)
-        prepared = prepare_request(request, base, context.settings)
+        prepared = context.reader.prepare(
+            base,
+            request.main,
+            request.options(),
+            progress=lambda done, stage: heart.report_stage(stage, 0.05 + (READ_SHARE - 0.1) * done),
+            should_cancel=heart.should_cancel,
+        )
         heart.report_stage("store", READ_SHARE - 0.05)
         entry = context.library.add(prepared, who=record.who)
     finally:

@@ -92,7 +92,7 @@ class PipelineRunner:
         )
 
     def _assets_of(self, store: ObjectStore) -> StoredAssets:
-        """Return the models of the store's assets, which all processes of this machine keep in one folder."""
+        """Return the store's assets; all processes of this machine keep their models in one folder."""
         from fullwell.assets.cache import BlobCache  # noqa: PLC0415
         from fullwell.assets.store import StoredAssets  # noqa: PLC0415
 

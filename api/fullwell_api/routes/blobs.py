@@ -48,6 +48,7 @@ class MissingOut(BaseModel):
 def missing(wanted: DigestList, parts: ServiceParts) -> MissingOut:
     """Return those of the digests whose content is not here."""
     digests = [check_digest(digest, path="digests") for digest in dict.fromkeys(wanted.digests)]
+    parts.library.hold(digests)  # who is told that a blob is here must find it here in a moment
     found = parts.threads.map(parts.store.exists, [blob_key(digest) for digest in digests])
     return MissingOut(missing=[digest for digest, there in zip(digests, found, strict=True) if not there])
 

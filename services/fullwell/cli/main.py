@@ -20,9 +20,9 @@ app = typer.Typer(
 
 
 def _register() -> None:
-    from fullwell.cli import bench, doctor, local, measure, service
+    from fullwell.cli import assets, bench, doctor, local, measure, service
 
-    for module in (local, measure, service, doctor, bench):
+    for module in (local, measure, service, assets, doctor, bench):
         module.register(app)
 
 

@@ -5,23 +5,25 @@ from __future__ import annotations
 import json
 import re
 import unicodedata
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 from typing import Any, Final
 
 from fullwell.assets.classes import asset_class
 from fullwell.assets.ingest.options import IngestLimits, IngestOptions
 from fullwell.assets.meshes import MODEL_SUFFIXES
-from fullwell.assets.records import LicenceRecord, PreparedAsset, check_asset_id, check_tags
+from fullwell.assets.records import LicenceRecord, check_asset_id, check_tags
 from fullwell.core import FieldError, sha256_hex
 from fullwell.core.settings import Settings
 from fullwell.jobs.files import check_files, relative_path
 
-__all__ = ["ARCHIVE_SUFFIXES", "RESERVED_IDS", "AssetRequest", "default_asset_id", "main_file", "prepare_request"]
+__all__ = ["ARCHIVE_SUFFIXES", "RESERVED_IDS", "AssetRequest", "default_asset_id", "ingest_limits", "main_file"]
 
 ARCHIVE_SUFFIXES: Final = (".zip",)
 """Archives whose content is unpacked by ingestion."""
+WALL_OVER_CPU: Final = 1.5
+"""A shared machine does not give all of its time to one process."""
 RESERVED_IDS: Final = frozenset({"archives", "classes", "export", "facets", "gc", "ingestions", "reindex", "review"})
 """Words that stand in an id's place in the addresses of the HTTP interface."""
 MAX_TEXT: Final = 500
@@ -106,25 +108,14 @@ class AssetRequest:
         return cls(**given | {"licence": LicenceRecord(**given["licence"]), "tags": tuple(given["tags"])})
 
 
-def prepare_request(
-    request: AssetRequest, folder: Path, settings: Settings, *, progress: Callable[[float, str], None] | None = None
-) -> PreparedAsset:
-    """Return the asset that a checked request asks for, from its files in `folder`: read in a child process, under limits.
-
-    Raises
-    ------
-    IngestError
-        The files are not acceptable, or a limit was passed. Nothing is left behind.
-    """
-    from fullwell.assets.ingest import prepare_in_child  # noqa: PLC0415 - loads what reads models
-
-    limits = IngestLimits(
+def ingest_limits(settings: Settings) -> IngestLimits:
+    """Return what taking in one asset may cost on this machine."""
+    return IngestLimits(
         memory_bytes=settings.ingest_memory_bytes,
         cpu_s=settings.ingest_time_limit_s,
-        wall_s=settings.ingest_time_limit_s * 1.5,
+        wall_s=settings.ingest_time_limit_s * WALL_OVER_CPU,
         input_bytes=settings.max_upload_bytes,
     )
-    return prepare_in_child(folder, request.main, request.options(), limits=limits, progress=progress)
 
 
 def default_asset_id(name: str) -> str:

@@ -51,7 +51,10 @@ class IngestionState(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class NewIngestion:
-    """Work to be done. `name` is for people, `who` asked for it, `request_json` is what the worker reads. Priority 0 to 9."""
+    """Work to be done. `name` is for people, `who` asked for it, `request_json` is what the worker reads. Priority 0 to 9.
+
+    `stored` is the version whose previews are to be rendered; uploads have none yet.
+    """
 
     kind: IngestionKind
     name: str
@@ -60,6 +63,7 @@ class NewIngestion:
     request_sha256: str
     priority: int = 3
     idempotency_key: str | None = None
+    stored: StoredAsset | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,6 +153,8 @@ class IngestionRepository:
                     request_sha256=new.request_sha256,
                     idempotency_key=new.idempotency_key,
                     created_at=self._database.now(session),
+                    asset_id=None if new.stored is None else new.stored.asset_id,
+                    asset_version=None if new.stored is None else new.stored.version,
                 )
                 session.add(row)
                 session.flush()

@@ -1,0 +1,55 @@
+"""Bringing the starter library into a store, on this machine or behind an address."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from fullwell.cli.asset_store import LocalAssets
+    from fullwell.client import Asset, FullwellClient
+
+__all__ = ["bring_starter"]
+
+WHO: Final = "starter"
+REASON: Final = "part of the starter library, whose generators are tested"
+
+
+def bring_starter(store: FullwellClient | LocalAssets, bars: Any, *, only: str, packaged: bool, approve: bool) -> list[Asset]:
+    """Generate the starter library and take it in; return its assets. What is here already stays as it is.
+
+    A service gets it as one archive: its own checks of an archive hold for these as for any.
+    """
+    from fullwell.cli.asset_store import LocalAssets
+
+    if isinstance(store, LocalAssets):
+        return _generate(store, bars, only=only, packaged=packaged, approve=approve)
+    from fullwell.core.settings import load_settings
+
+    with tempfile.TemporaryDirectory(prefix="fullwell-starter-") as folder:
+        home = Path(folder)
+        settings = load_settings(home=home, database_url=f"sqlite:///{home / 'starter.sqlite3'}", store_url=home.as_uri())
+        with LocalAssets(settings) as here:
+            made = _generate(here, bars, only=only, packaged=packaged, approve=approve)
+            here.export(home / "starter.zip", ids=[asset.id for asset in made])
+        came = store.assets.import_archive(home / "starter.zip", trust_states=approve)
+    return list(came)
+
+
+def _generate(store: LocalAssets, bars: Any, *, only: str, packaged: bool, approve: bool) -> list[Asset]:
+    from fullwell.assets.starter.library import prepare_starter, starter_entries
+
+    entries = [
+        entry for entry in starter_entries(packaged=packaged) if entry.id.startswith(only) or entry.asset_class.startswith(only)
+    ]
+    total = bars.add_task("starter library", total=len(entries))
+    made: list[Asset] = []
+    for entry in entries:
+        bars.update(total, description=entry.id)
+        asset, is_new = store.add(prepare_starter(entry), who=WHO)
+        if approve and asset.state == "pending" and (is_new or asset.document["created_by"] == WHO):
+            asset = store.review("approved", ids=[asset.id], reason=REASON, who=WHO)[0]
+        made.append(asset)
+        bars.advance(total)
+    return made
