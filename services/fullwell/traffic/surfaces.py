@@ -1,0 +1,284 @@
+"""What a road network looks like: carriageway, raised pavements with kerbs, markings, and the ground around."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from fullwell.traffic.ribbons import cut, dashes, length_m, offset, ribbon
+from fullwell.traffic.roads import Lane, RoadNetwork
+
+__all__ = ["KERB_HEIGHT_M", "GroundPlan", "RoadStyle", "RoadSurface", "ground_plan", "road_surfaces"]
+
+Array = NDArray[np.float64]
+
+KERB_HEIGHT_M: Final = 0.12
+"""Height of a pavement above the carriageway."""
+_KERB_WIDTH_M: Final = 0.15
+_MARK_M: Final = 0.004
+"""Markings lie this much above the road: thermoplastic is 2 to 5 mm thick."""
+_LINE_M: Final = 0.12
+_DASH_M: Final = (3.0, 6.0)
+_FAST_DASH_M: Final = (6.0, 12.0)
+_STOP_LINE_M: Final = 0.5
+_STRIPE_M: Final = (0.5, 0.5)
+_FAST_M_S: Final = 20.0
+_MARGIN_M: Final = 300.0
+_FINE_M: Final = 4.0
+"""Edges are cut to this length where the network has slopes."""
+_SMALLEST_M2: Final = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class RoadStyle:
+    """What things are made of, by names of the catalogue of materials; and whether edges of roads without kerbs are marked."""
+
+    road: str = "asphalt/worn"
+    walk: str = "concrete/light"
+    kerb: str = "stone/granite"
+    ground: str = "grass/green"
+    mark: str = "line/white_thermoplastic"
+    edge_lines: bool = False
+    zebra: bool = True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoadSurface:
+    """Triangles of one kind: `name` is the semantic class, `vertices_m` (n, 3), `faces` (m, 3), front upwards or outwards."""
+
+    name: str
+    material: str
+    vertices_m: Array
+    faces: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GroundPlan:
+    """Regions of a network from above (shapely geometries, metres), and the height of the carriageway anywhere."""
+
+    carriageway: Any
+    walk: Any
+    crossings: Any
+    heights: _Heights
+
+    def is_free(self, outline: Any) -> bool:
+        """Return whether a footprint touches neither carriageway nor pavement."""
+        return not (self.carriageway.intersects(outline) or self.walk.intersects(outline))
+
+
+class _Heights:
+    """Height of the road that is nearest; 0 for flat networks."""
+
+    def __init__(self, network: RoadNetwork) -> None:
+        points = np.concatenate([lane.centre_m for lane in network.lanes])
+        self.flat = bool(np.ptp(points[:, 2]) < 1e-3)
+        self._level = float(points[:, 2].mean()) if self.flat else 0.0
+        self._tree = None if self.flat else cKDTree(points[:, :2])
+        self._points = points
+
+    def at(self, places_m: Array) -> Array:
+        """Return (n,) heights [m] at (n, 2) places: the mean of the nearest few points of lanes, by inverse distance."""
+        if self._tree is None:
+            return np.full(len(places_m), self._level)
+        distance, nearest = self._tree.query(places_m, k=min(4, len(self._points)))
+        weight = 1.0 / np.maximum(distance.reshape(len(places_m), -1), 0.05) ** 2
+        return np.asarray((weight * self._points[nearest.reshape(weight.shape), 2]).sum(axis=1) / weight.sum(axis=1))
+
+
+def ground_plan(network: RoadNetwork) -> GroundPlan:
+    """Return the regions of a network: where vehicles drive, where people walk, and where they cross."""
+    driven = [_strip(lane) for lane in network.of_kind("drive", "bus", "bike", "shoulder", "rail")]
+    junctions = [shapely.Polygon(junction.outline_m[:, :2]).buffer(0) for junction in network.junctions]
+    walked = [_strip(lane) for lane in network.of_kind("sidewalk")]
+    walked += [
+        shapely.Polygon(lane.centre_m[:, :2]).buffer(0) for lane in network.of_kind("walking_area") if len(lane.centre_m) > 2
+    ]
+    crossings = shapely.union_all([_strip(lane) for lane in network.of_kind("crossing")])
+    walk = _closed(shapely.union_all(walked)).difference(crossings)
+    carriageway = _closed(shapely.union_all([*driven, *junctions, crossings])).difference(walk)
+    return GroundPlan(carriageway, walk, crossings, _Heights(network))
+
+
+def road_surfaces(
+    network: RoadNetwork, plan: GroundPlan, style: RoadStyle, *, margin_m: float = _MARGIN_M
+) -> list[RoadSurface]:
+    """Return everything on the ground: road, sidewalk, kerb, marking and terrain, with the ground `margin_m` beyond the roads."""
+    heights = plan.heights
+    kerb = plan.walk.difference(plan.walk.buffer(-_KERB_WIDTH_M, join_style="mitre")).intersection(
+        plan.carriageway.buffer(2 * _KERB_WIDTH_M)
+    )
+    outer = shapely.box(*plan.carriageway.union(plan.walk).bounds).buffer(margin_m, join_style="mitre")
+    ground = outer.difference(shapely.union_all([plan.carriageway, plan.walk]).buffer(0.01))
+    surfaces = [
+        _flat("road", style.road, plan.carriageway, heights, 0.0),
+        _flat("sidewalk", style.walk, plan.walk.difference(kerb), heights, KERB_HEIGHT_M),
+        _flat("kerb", style.kerb, kerb, heights, KERB_HEIGHT_M),
+        _walls("kerb", style.kerb, plan.walk, heights, KERB_HEIGHT_M),
+        _flat("terrain", style.ground, ground, heights, KERB_HEIGHT_M - 0.03),
+        _ribbons("marking", style.mark, _marks(network, style, heights)),
+    ]
+    merged: dict[tuple[str, str], list[RoadSurface]] = {}
+    for surface in surfaces:
+        if len(surface.faces):
+            merged.setdefault((surface.name, surface.material), []).append(surface)
+    return [_joined(parts) for parts in merged.values()]
+
+
+# Regions -------------------------------------------------------------------------------------------------------------
+
+
+def _strip(lane: Lane) -> Any:
+    """Return the lane from above. Butt ends: neighbours meet at them."""
+    return shapely.LineString(lane.centre_m[:, :2]).buffer(
+        lane.width_m / 2, cap_style="flat", join_style="mitre", mitre_limit=2.0
+    )
+
+
+def _closed(region: Any) -> Any:
+    """Return a region without the slivers that rounding leaves between neighbours."""
+    return region.buffer(0.05, join_style="mitre").buffer(-0.05, join_style="mitre")
+
+
+def _polygons(region: Any) -> Iterator[Any]:
+    for part in shapely.get_parts(shapely.make_valid(region)):
+        if part.geom_type == "MultiPolygon":
+            yield from _polygons(part)
+        elif part.geom_type == "Polygon" and part.area > _SMALLEST_M2:
+            yield part
+
+
+def _flat(name: str, material: str, region: Any, heights: _Heights, raised_m: float) -> RoadSurface:
+    corners: list[Array] = []
+    for polygon in _polygons(region):
+        fine = polygon if heights.flat else shapely.segmentize(polygon, _FINE_M)
+        for triangle in shapely.get_parts(shapely.constrained_delaunay_triangles(fine)):
+            ring = np.asarray(triangle.exterior.coords)[:3, :2]
+            first, second = ring[1] - ring[0], ring[2] - ring[0]
+            corners.append(ring if first[0] * second[1] - first[1] * second[0] > 0 else ring[::-1])
+    if not corners:
+        return RoadSurface(name, material, np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+    places, where = np.unique(np.round(np.concatenate(corners), 6), axis=0, return_inverse=True)
+    vertices = np.column_stack([places, heights.at(places) + raised_m])
+    return RoadSurface(name, material, vertices, where.reshape(-1, 3).astype(np.int64))
+
+
+def _walls(name: str, material: str, region: Any, heights: _Heights, high_m: float) -> RoadSurface:
+    """Return the upright sides of a raised region."""
+    vertices, faces, count = [], [], 0
+    for polygon in _polygons(region):
+        fine = shapely.orient_polygons(polygon if heights.flat else shapely.segmentize(polygon, _FINE_M))
+        for ring in (fine.exterior, *fine.interiors):
+            # Exterior rings run counter-clockwise: the outside is to the right of the way along them, as it is for holes.
+            places = np.asarray(ring.coords)[:, :2]
+            level = heights.at(places)
+            low, high = np.column_stack([places, level - 0.02]), np.column_stack([places, level + high_m])
+            here = count + np.arange(len(places) - 1)
+            size = len(places)
+            vertices += [low, high]
+            faces.append(np.stack([here, here + 1, here + 1 + size], axis=1))
+            faces.append(np.stack([here, here + 1 + size, here + size], axis=1))
+            count += 2 * size
+    if not vertices:
+        return RoadSurface(name, material, np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+    return RoadSurface(name, material, np.concatenate(vertices), np.concatenate(faces).astype(np.int64))
+
+
+# Markings ------------------------------------------------------------------------------------------------------------
+
+Mark = tuple[Array, float]
+"""A line (n, 3) and the width of its paint [m]."""
+
+
+def _marks(network: RoadNetwork, style: RoadStyle, heights: _Heights) -> Iterator[Mark]:
+    by_edge: dict[str, list[Lane]] = {}
+    for lane in network.of_kind("drive", "bus", "bike", "shoulder"):
+        by_edge.setdefault(lane.edge_id, []).append(lane)
+    ends = {lane.edge_id: (lanes[0].centre_m[0], lanes[0].centre_m[-1]) for lanes in by_edge.values() for lane in lanes}
+    for edge, lanes in by_edge.items():
+        ordered = sorted(lanes, key=lambda lane: lane.index)
+        yield from _between_lanes(ordered)
+        yield from _left_edge(edge, ordered[-1], by_edge)
+        if style.edge_lines or ordered[0].kind == "shoulder":
+            first = next((lane for lane in ordered if lane.kind != "shoulder"), ordered[0])
+            yield offset(first.centre_m, -first.width_m / 2 + _LINE_M), _LINE_M
+    del ends
+    yield from _stop_lines(network)
+    if style.zebra:
+        for lane in network.of_kind("crossing"):
+            yield from _zebra(lane, heights)
+
+
+def _between_lanes(ordered: Sequence[Lane]) -> Iterator[Mark]:
+    for right, left in zip(ordered[:-1], ordered[1:], strict=True):
+        line = offset(right.centre_m, right.width_m / 2)
+        if right.kind == left.kind == "drive":
+            mark, gap = _FAST_DASH_M if right.speed_m_s > _FAST_M_S else _DASH_M
+            yield from ((dash, _LINE_M) for dash in dashes(line, mark, gap))
+        elif right.kind != "shoulder":  # to a bus or cycle lane: a line that is not to be crossed
+            yield line, 2 * _LINE_M if "bus" in (right.kind, left.kind) else _LINE_M
+
+
+def _left_edge(edge: str, leftmost: Lane, by_edge: dict[str, list[Lane]]) -> Iterator[Mark]:
+    line = offset(leftmost.centre_m, leftmost.width_m / 2)
+    other = by_edge.get(_opposite(edge, leftmost, by_edge))
+    if other is None:
+        yield offset(leftmost.centre_m, leftmost.width_m / 2 - _LINE_M), _LINE_M
+    elif edge < other[0].edge_id:  # drawn once for both directions
+        mark, gap = _FAST_DASH_M if leftmost.speed_m_s > _FAST_M_S else _DASH_M
+        yield from ((dash, _LINE_M) for dash in dashes(line, mark, gap))
+
+
+def _opposite(edge: str, leftmost: Lane, by_edge: dict[str, list[Lane]]) -> str:
+    """Return the edge whose leftmost lane runs beside this one in the other direction, "" where there is none."""
+    line = offset(leftmost.centre_m, leftmost.width_m / 2)
+    for name, lanes in by_edge.items():
+        if name == edge:
+            continue
+        last = max(lanes, key=lambda lane: lane.index)
+        other = offset(last.centre_m, last.width_m / 2)
+        if np.linalg.norm(line[0, :2] - other[-1, :2]) < 0.5 and np.linalg.norm(line[-1, :2] - other[0, :2]) < 0.5:
+            return name
+    return ""
+
+
+def _stop_lines(network: RoadNetwork) -> Iterator[Mark]:
+    controlled = {link.from_lane for link in network.signals if not link.crossing}
+    for lane in network.of_kind("drive", "bus", "bike"):
+        whole = length_m(lane.centre_m)
+        if lane.id in controlled and whole > 6.0:
+            middle = cut(lane.centre_m, whole - 0.15 - _STOP_LINE_M, whole - 0.15)
+            yield middle, lane.width_m - 0.3
+
+
+def _zebra(lane: Lane, heights: _Heights) -> Iterator[Mark]:
+    """Stripes across a crossing: each is as long as the crossing is wide, and lies along the road."""
+    stripe, gap = _STRIPE_M
+    del heights
+    for mark in dashes(lane.centre_m, stripe, gap):
+        yield mark, lane.width_m
+
+
+def _ribbons(name: str, material: str, marks: Iterable[Mark]) -> RoadSurface:
+    vertices, faces, count = [], [], 0
+    for line, width in marks:
+        if len(line) < 2 or width <= 0:
+            continue
+        points, triangles = ribbon(line, width, raised_m=_MARK_M)
+        vertices.append(points)
+        faces.append(triangles + count)
+        count += len(points)
+    if not vertices:
+        return RoadSurface(name, material, np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+    return RoadSurface(name, material, np.concatenate(vertices), np.concatenate(faces))
+
+
+def _joined(parts: Sequence[RoadSurface]) -> RoadSurface:
+    starts = np.cumsum([0, *(len(part.vertices_m) for part in parts)])
+    faces = np.concatenate([part.faces + start for part, start in zip(parts, starts[:-1], strict=True)])
+    return RoadSurface(parts[0].name, parts[0].material, np.concatenate([part.vertices_m for part in parts]), faces)
