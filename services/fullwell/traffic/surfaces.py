@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -33,6 +34,7 @@ _MARGIN_M: Final = 300.0
 _FINE_M: Final = 4.0
 """Edges are cut to this length where the network has slopes."""
 _SMALLEST_M2: Final = 0.02
+_NO_AREA_M2: Final = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,9 +98,8 @@ def ground_plan(network: RoadNetwork) -> GroundPlan:
     driven = [_strip(lane) for lane in network.of_kind("drive", "bus", "bike", "shoulder", "rail")]
     junctions = [shapely.Polygon(junction.outline_m[:, :2]).buffer(0) for junction in network.junctions]
     walked = [_strip(lane) for lane in network.of_kind("sidewalk")]
-    walked += [
-        shapely.Polygon(lane.centre_m[:, :2]).buffer(0) for lane in network.of_kind("walking_area") if len(lane.centre_m) > 2
-    ]
+    areas = [lane.centre_m[:, :2] for lane in network.of_kind("walking_area") if len(lane.centre_m) > 2]
+    walked += [shapely.Polygon(outline).buffer(0) for outline in areas]
     crossings = shapely.union_all([_strip(lane) for lane in network.of_kind("crossing")])
     walk = _closed(shapely.union_all(walked)).difference(crossings)
     carriageway = _closed(shapely.union_all([*driven, *junctions, crossings])).difference(walk)
@@ -108,7 +109,7 @@ def ground_plan(network: RoadNetwork) -> GroundPlan:
 def road_surfaces(
     network: RoadNetwork, plan: GroundPlan, style: RoadStyle, *, margin_m: float = _MARGIN_M
 ) -> list[RoadSurface]:
-    """Return everything on the ground: road, sidewalk, kerb, marking and terrain, with the ground `margin_m` beyond the roads."""
+    """Return everything on the ground: road, sidewalk, kerb, marking, and terrain to `margin_m` beyond the roads."""
     heights = plan.heights
     kerb = plan.walk.difference(plan.walk.buffer(-_KERB_WIDTH_M, join_style="mitre")).intersection(
         plan.carriageway.buffer(2 * _KERB_WIDTH_M)
@@ -121,7 +122,7 @@ def road_surfaces(
         _flat("kerb", style.kerb, kerb, heights, KERB_HEIGHT_M),
         _walls("kerb", style.kerb, plan.walk, heights, KERB_HEIGHT_M),
         _flat("terrain", style.ground, ground, heights, KERB_HEIGHT_M - 0.03),
-        _ribbons("marking", style.mark, _marks(network, style, heights)),
+        _ribbons("marking", style.mark, _marks(network, style)),
     ]
     merged: dict[tuple[str, str], list[RoadSurface]] = {}
     for surface in surfaces:
@@ -160,22 +161,27 @@ def _flat(name: str, material: str, region: Any, heights: _Heights, raised_m: fl
         for triangle in shapely.get_parts(shapely.constrained_delaunay_triangles(fine)):
             ring = np.asarray(triangle.exterior.coords)[:3, :2]
             first, second = ring[1] - ring[0], ring[2] - ring[0]
-            corners.append(ring if first[0] * second[1] - first[1] * second[0] > 0 else ring[::-1])
+            doubled_m2 = first[0] * second[1] - first[1] * second[0]
+            if abs(doubled_m2) > _NO_AREA_M2:
+                corners.append(ring if doubled_m2 > 0 else ring[::-1])
     if not corners:
         return RoadSurface(name, material, np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
-    places, where = np.unique(np.round(np.concatenate(corners), 6), axis=0, return_inverse=True)
+    rounded: Array = np.round(np.concatenate(corners), 6)
+    places, where = np.unique(rounded, axis=0, return_inverse=True)
     vertices = np.column_stack([places, heights.at(places) + raised_m])
     return RoadSurface(name, material, vertices, where.reshape(-1, 3).astype(np.int64))
 
 
 def _walls(name: str, material: str, region: Any, heights: _Heights, high_m: float) -> RoadSurface:
     """Return the upright sides of a raised region."""
-    vertices, faces, count = [], [], 0
+    vertices: list[Array] = []
+    faces: list[NDArray[np.int64]] = []
+    count = 0
     for polygon in _polygons(region):
         fine = shapely.orient_polygons(polygon if heights.flat else shapely.segmentize(polygon, _FINE_M))
         for ring in (fine.exterior, *fine.interiors):
             # Exterior rings run counter-clockwise: the outside is to the right of the way along them, as it is for holes.
-            places = np.asarray(ring.coords)[:, :2]
+            places = np.asarray(ring.coords, dtype=np.float64)[:, :2]
             level = heights.at(places)
             low, high = np.column_stack([places, level - 0.02]), np.column_stack([places, level + high_m])
             here = count + np.arange(len(places) - 1)
@@ -195,11 +201,10 @@ Mark = tuple[Array, float]
 """A line (n, 3) and the width of its paint [m]."""
 
 
-def _marks(network: RoadNetwork, style: RoadStyle, heights: _Heights) -> Iterator[Mark]:
+def _marks(network: RoadNetwork, style: RoadStyle) -> Iterator[Mark]:
     by_edge: dict[str, list[Lane]] = {}
     for lane in network.of_kind("drive", "bus", "bike", "shoulder"):
         by_edge.setdefault(lane.edge_id, []).append(lane)
-    ends = {lane.edge_id: (lanes[0].centre_m[0], lanes[0].centre_m[-1]) for lanes in by_edge.values() for lane in lanes}
     for edge, lanes in by_edge.items():
         ordered = sorted(lanes, key=lambda lane: lane.index)
         yield from _between_lanes(ordered)
@@ -207,15 +212,14 @@ def _marks(network: RoadNetwork, style: RoadStyle, heights: _Heights) -> Iterato
         if style.edge_lines or ordered[0].kind == "shoulder":
             first = next((lane for lane in ordered if lane.kind != "shoulder"), ordered[0])
             yield offset(first.centre_m, -first.width_m / 2 + _LINE_M), _LINE_M
-    del ends
     yield from _stop_lines(network)
     if style.zebra:
         for lane in network.of_kind("crossing"):
-            yield from _zebra(lane, heights)
+            yield from ((mark, lane.width_m) for mark in dashes(lane.centre_m, *_STRIPE_M))
 
 
 def _between_lanes(ordered: Sequence[Lane]) -> Iterator[Mark]:
-    for right, left in zip(ordered[:-1], ordered[1:], strict=True):
+    for right, left in itertools.pairwise(ordered):
         line = offset(right.centre_m, right.width_m / 2)
         if right.kind == left.kind == "drive":
             mark, gap = _FAST_DASH_M if right.speed_m_s > _FAST_M_S else _DASH_M
@@ -256,16 +260,10 @@ def _stop_lines(network: RoadNetwork) -> Iterator[Mark]:
             yield middle, lane.width_m - 0.3
 
 
-def _zebra(lane: Lane, heights: _Heights) -> Iterator[Mark]:
-    """Stripes across a crossing: each is as long as the crossing is wide, and lies along the road."""
-    stripe, gap = _STRIPE_M
-    del heights
-    for mark in dashes(lane.centre_m, stripe, gap):
-        yield mark, lane.width_m
-
-
 def _ribbons(name: str, material: str, marks: Iterable[Mark]) -> RoadSurface:
-    vertices, faces, count = [], [], 0
+    vertices: list[Array] = []
+    faces: list[NDArray[np.int64]] = []
+    count = 0
     for line, width in marks:
         if len(line) < 2 or width <= 0:
             continue
