@@ -69,8 +69,8 @@ def _pigments() -> Mapping[str, tuple[Array, Array]]:
         ),
         "ultramarine": (band(600.0, 48.0, 2.8) + band(540.0, 35.0, 0.7) + 0.02, 0.05 * small),
         # Diketopyrrolopyrrole red: absorbs 420 to 580 nm, steep flank.
-        "dpp_red": (edge(577.0, 7.5, 5.0) - edge(405.0, 14.0, 0.8) + 0.008, 0.32 * small),
-        "organic_orange": (edge(553.0, 8.0, 4.0) - edge(400.0, 18.0, 1.0) + 0.01, 0.3 * small),
+        "dpp_red": (edge(569.0, 8.5, 5.0) - edge(405.0, 14.0, 0.8) + 0.008, 0.32 * small),
+        "organic_orange": (edge(547.0, 8.0, 4.0) - edge(400.0, 18.0, 1.0) + 0.01, 0.3 * small),
         "bismuth_vanadate": (edge(478.0, 9.0, 4.5) + 0.012, 0.75 * relative**-0.7),
         "organic_yellow": (edge(488.0, 8.0, 6.0) + 0.01, 0.1 * small),
         # A fibre or sheet of cellulose: yellowish tail, water at 970 nm.
