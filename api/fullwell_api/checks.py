@@ -2,21 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from fullwell.core import FieldError, canonical_json
+from fullwell.core import AssetError, FieldError, canonical_json
 from fullwell.jobs.files import blob_key, check_references, file_references
 from fullwell.schema import RecipeDocument, load_recipe, validate
+from fullwell.schema.assets import asks_for_assets, pin_assets
 from fullwell_api.services import Services
+
+if TYPE_CHECKING:
+    from fullwell.assets.query import AssetQuery
+    from fullwell.assets.records import AssetManifest
+    from fullwell.jobs.asset_library import AssetLibrary
 
 __all__ = ["check_blobs", "checked_document"]
 
 
-def checked_document(recipe: Mapping[str, Any], overrides: Mapping[str, Any], files: Mapping[str, str]) -> RecipeDocument:
+def checked_document(
+    recipe: Mapping[str, Any],
+    overrides: Mapping[str, Any],
+    files: Mapping[str, str],
+    *,
+    library: AssetLibrary | None = None,
+) -> RecipeDocument:
     """Return the validated document of a submission; RecipeError or FieldError say what is wrong.
 
-    Files are not opened: they are checked by name and digest here, and by content when a worker reads them.
+    Files are not opened: they are checked by name and digest here, and by content when a worker reads them. Draws of assets
+    are pinned to what the library holds now, so that workers, and a retry next year, choose among the same.
     """
     try:
         canonical_json([recipe, overrides])
@@ -26,10 +40,31 @@ def checked_document(recipe: Mapping[str, Any], overrides: Mapping[str, Any], fi
     document = load_recipe(dict(recipe), overrides=overrides)
     plain = document.plain()
     check_references(plain, files)
+    if asks_for_assets(document):
+        return document if library is None else pin_assets(document, _Candidates(library))
     if not any(True for _ in file_references(plain)):
         # Names of sensors, spectra and the like, and every value of `vary`. Model files are read by workers only.
         validate(document)
     return document
+
+
+class _Candidates:
+    """A library as recipes ask it for candidates. Models are read by workers only."""
+
+    def __init__(self, library: AssetLibrary) -> None:
+        self._library = library
+
+    def candidates(self, query: AssetQuery) -> Sequence[tuple[str, str]]:
+        """Return (id, digest) of each asset that matches, sorted by id."""
+        return self._library.candidates(query)
+
+    def manifest(self, digest: str) -> AssetManifest:
+        """Return a version's manifest."""
+        return self._library.by_digest(digest).manifest
+
+    def level_file(self, manifest: AssetManifest, level: int) -> Path:
+        """Refuse: this process opens no models."""
+        raise AssetError(f"level {level} of asset {manifest.id!r} cannot be read here; workers do.")
 
 
 def check_blobs(parts: Services, files: Mapping[str, str]) -> None:

@@ -12,6 +12,7 @@ from fullwell.core import FieldError, digest_of
 from fullwell.jobs.files import check_files
 from fullwell.jobs.records import JobInput, NewJob
 from fullwell.jobs.states import FrameState, JobState
+from fullwell.schema import RecipeDocument
 from fullwell_api.checks import check_blobs, checked_document
 from fullwell_api.events import job_events
 from fullwell_api.models import (
@@ -39,7 +40,7 @@ IdempotencyKey = Annotated[str | None, Header(min_length=1, max_length=255, patt
 def submit(submission: Submission, response: Response, parts: ServiceParts, idempotency_key: IdempotencyKey = None) -> JobOut:
     """Check the recipe, store the job and queue its frames. The same `Idempotency-Key` gives the same job again."""
     files = check_files(submission.files)
-    document = checked_document(submission.recipe, submission.overrides, files)
+    document = checked_document(submission.recipe, submission.overrides, files, library=parts.library)
     limit = parts.settings.max_frames_per_job
     if document.frame_count() > limit:
         raise FieldError(
@@ -48,12 +49,15 @@ def submit(submission: Submission, response: Response, parts: ServiceParts, idem
             document.frame_count(),
         )
     check_blobs(parts, files)
+    recipe = json.dumps(_pinned(submission.recipe, document))
     job, _ = parts.repository.create_job(
         NewJob(
             name=document.name,
             frame_count=document.frame_count(),
             # Not sorted: the order of the keys of `vary` decides which frame has which number.
-            given=JobInput(json.dumps(submission.recipe), json.dumps(submission.overrides), json.dumps(files)),
+            given=JobInput(
+                json.dumps(_pinned(submission.recipe, document)), json.dumps(submission.overrides), json.dumps(files)
+            ),
             request_sha256=digest_of([json.dumps(submission.model_dump())]),
             priority=submission.priority,
             idempotency_key=idempotency_key,
@@ -138,6 +142,11 @@ async def events(
 ) -> Any:
     """Send `job` and `frame` events as things change and `end` when the job has ended. `Last-Event-ID` resumes."""
     return EventSourceResponse(await job_events(parts, job_id, request, last_event_id), ping=15)
+
+
+def _pinned(recipe: dict[str, Any], document: RecipeDocument) -> dict[str, Any]:
+    """Return the recipe with the pins of its draws; one that draws nothing as it was given."""
+    return recipe | {"assets": dict(document.assets)} if document.assets else recipe
 
 
 def _frame_number(number: int) -> int:

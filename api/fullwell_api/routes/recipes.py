@@ -11,6 +11,7 @@ from fullwell.schema import RecipeError
 from fullwell_api.checks import checked_document
 from fullwell_api.models import Submission
 from fullwell_api.problems import FieldProblem
+from fullwell_api.services import ServiceParts
 
 __all__ = ["router"]
 
@@ -28,10 +29,11 @@ class Verdict(BaseModel):
 
 
 @router.post("/recipes/validate", summary="Check a recipe")
-def validate(submission: Submission) -> Verdict:
+def validate(submission: Submission, parts: ServiceParts) -> Verdict:
     """Check a submission as `POST /jobs` would, without storing it. An illegal recipe is an answer here, not an error."""
     try:
-        document = checked_document(submission.recipe, submission.overrides, check_files(submission.files))
+        files = check_files(submission.files)
+        document = checked_document(submission.recipe, submission.overrides, files, library=parts.library)
     except RecipeError as error:
         problems = [FieldProblem(path=item.path, message=item.message, value=_text(item.value)) for item in error.errors]
         return Verdict(valid=False, errors=problems)

@@ -658,7 +658,7 @@ def _print_assets(assets: list[Asset], *, checks: bool = False) -> None:
     columns = [
         Column("asset", no_wrap=True, overflow="fold"),
         Column("class", no_wrap=True),
-        Column("L x W x H [m]", justify="right", no_wrap=True),
+        Column("L x W x H \\[m]", justify="right", no_wrap=True),
     ]
     if checks:
         columns.append(Column("checks"))
@@ -716,7 +716,7 @@ def _print_asset(asset: Asset) -> None:
     for check in manifest["checks"]:
         checks.add_row(check["name"], f"[{CHECK_STYLES[check['state']]}]{check['state']}[/]", escape(check["message"]))
     console.print(checks)
-    parts = Table("part", "triangles", "area [m2]", "material", "chosen by")
+    parts = Table("part", "triangles", "area \\[m2]", "material", "chosen by")
     for part in manifest["parts"]:
         material = part["material"]
         name = material["name"] or "from the file's colour"
