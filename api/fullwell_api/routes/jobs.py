@@ -55,9 +55,7 @@ def submit(submission: Submission, response: Response, parts: ServiceParts, idem
             name=document.name,
             frame_count=document.frame_count(),
             # Not sorted: the order of the keys of `vary` decides which frame has which number.
-            given=JobInput(
-                json.dumps(_pinned(submission.recipe, document)), json.dumps(submission.overrides), json.dumps(files)
-            ),
+            given=JobInput(recipe, json.dumps(submission.overrides), json.dumps(files)),
             request_sha256=digest_of([json.dumps(submission.model_dump())]),
             priority=submission.priority,
             idempotency_key=idempotency_key,

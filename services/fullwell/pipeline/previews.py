@@ -277,7 +277,7 @@ def materials_recipe(manifest: AssetManifest) -> RecipeDocument | None:
 def _ball_material(choice: MaterialChoice) -> Any:
     if choice.name:
         return choice.name
-    colour = {"rgb": list(choice.base_color_srgb)}
+    colour = {"srgb": list(choice.base_color_srgb)}
     return {
         "kind": "principled",
         "base_color": colour,
