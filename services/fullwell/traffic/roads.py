@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from fullwell.traffic.networks import NetworkFile
 from fullwell.traffic.sumo import TrafficError
+from fullwell.traffic.templates import PARKING
 
 __all__ = ["Junction", "Lane", "LaneKind", "RoadNetwork", "SignalLink", "read_network"]
 
 Array = NDArray[np.float64]
-LaneKind = Literal["drive", "bus", "bike", "sidewalk", "shoulder", "rail", "crossing", "walking_area", "internal"]
+LaneKind = Literal["drive", "bus", "bike", "parking", "sidewalk", "shoulder", "rail", "crossing", "walking_area", "internal"]
 
 _FAR_M: Final = 10_000.0
 """Networks that lie farther from their origin are moved: float32 is 1 mm coarse at 10 km."""
@@ -191,6 +192,8 @@ def _kind(function: str, permissions: set[str]) -> LaneKind:
         return "crossing" if function == "crossing" else "walking_area"
     if function == "internal":
         return "internal"
+    if permissions == {PARKING}:
+        return "parking"
     if "passenger" in permissions:
         return "drive"
     if permissions & {"bus", "coach", "delivery", "truck"}:

@@ -95,7 +95,7 @@ class _Heights:
 
 def ground_plan(network: RoadNetwork) -> GroundPlan:
     """Return the regions of a network: where vehicles drive, where people walk, and where they cross."""
-    driven = [_strip(lane) for lane in network.of_kind("drive", "bus", "bike", "shoulder", "rail")]
+    driven = [_strip(lane) for lane in network.of_kind("drive", "bus", "bike", "parking", "shoulder", "rail")]
     junctions = [shapely.Polygon(junction.outline_m[:, :2]).buffer(0) for junction in network.junctions]
     walked = [_strip(lane) for lane in network.of_kind("sidewalk")]
     areas = [lane.centre_m[:, :2] for lane in network.of_kind("walking_area") if len(lane.centre_m) > 2]
@@ -166,7 +166,7 @@ def _flat(name: str, material: str, region: Any, heights: _Heights, raised_m: fl
                 corners.append(ring if doubled_m2 > 0 else ring[::-1])
     if not corners:
         return RoadSurface(name, material, np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
-    rounded: Array = np.round(np.concatenate(corners), 6)
+    rounded = np.asarray(np.round(np.concatenate(corners), 6), dtype=np.float64)
     places, where = np.unique(rounded, axis=0, return_inverse=True)
     vertices = np.column_stack([places, heights.at(places) + raised_m])
     return RoadSurface(name, material, vertices, where.reshape(-1, 3).astype(np.int64))
@@ -203,7 +203,7 @@ Mark = tuple[Array, float]
 
 def _marks(network: RoadNetwork, style: RoadStyle) -> Iterator[Mark]:
     by_edge: dict[str, list[Lane]] = {}
-    for lane in network.of_kind("drive", "bus", "bike", "shoulder"):
+    for lane in network.of_kind("drive", "bus", "bike", "parking", "shoulder"):
         by_edge.setdefault(lane.edge_id, []).append(lane)
     for edge, lanes in by_edge.items():
         ordered = sorted(lanes, key=lambda lane: lane.index)

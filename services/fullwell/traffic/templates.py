@@ -9,25 +9,30 @@ from types import MappingProxyType
 from typing import Final
 from xml.sax.saxutils import quoteattr
 
-__all__ = ["TEMPLATE_NAMES", "CrossSection", "PlainNetwork", "template"]
+__all__ = ["PARKING", "TEMPLATE_NAMES", "CrossSection", "PlainNetwork", "template"]
 
 Point = tuple[float, float]
+
+PARKING: Final = "custom1"
+"""The vehicle class of lanes that cars stand on: SUMO lets nothing drive there."""
 
 
 @dataclass(frozen=True, slots=True)
 class CrossSection:
-    """One direction of a road, widths in metres; 0 leaves a lane out. From the kerb: sidewalk, cycle lane, bus lane, lanes."""
+    """One direction of a road, widths [m]; 0 leaves a lane out. From the right: sidewalk, parking, bicycles, buses, others."""
 
     lanes: int = 1
     lane_width_m: float = 3.2
-    sidewalk_width_m: float = 2.5
+    sidewalk_width_m: float = 3.0
+    parking_width_m: float = 0.0
     bike_lane_width_m: float = 0.0
     bus_lane_width_m: float = 0.0
     speed_m_s: float = 13.9
 
     def lane_elements(self) -> str:
         """Return the lanes as elements of an edge file, the rightmost first."""
-        rows = [("pedestrian", self.sidewalk_width_m), ("bicycle", self.bike_lane_width_m), ("bus taxi", self.bus_lane_width_m)]
+        rows = [("pedestrian", self.sidewalk_width_m), (PARKING, self.parking_width_m)]
+        rows += [("bicycle", self.bike_lane_width_m), ("bus taxi", self.bus_lane_width_m)]
         given = [f'allow="{who}" width="{width:g}"' for who, width in rows if width > 0]
         # Bicycles ride on the road where they have no lane; pedestrians only where there is no sidewalk.
         barred = ["tram rail rail_urban rail_electric rail_fast ship"]
@@ -37,9 +42,13 @@ class CrossSection:
         return "".join(f'<lane index="{index}" {attributes}/>' for index, attributes in enumerate(given))
 
     @property
+    def _side_widths_m(self) -> tuple[float, ...]:
+        return self.sidewalk_width_m, self.parking_width_m, self.bike_lane_width_m, self.bus_lane_width_m
+
+    @property
     def lane_count(self) -> int:
         """All lanes of the direction, the sidewalk among them."""
-        return self.lanes + sum(width > 0 for width in (self.sidewalk_width_m, self.bike_lane_width_m, self.bus_lane_width_m))
+        return self.lanes + sum(width > 0 for width in self._side_widths_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,12 +172,36 @@ def _motorway(section: CrossSection, length_m: float, signals: bool) -> PlainNet
     return drawing.text()
 
 
+def _blocks(section: CrossSection, length_m: float, signals: bool) -> PlainNetwork:
+    """Three by three junctions in blocks of a third of the length, with roads that lead in and out on all sides."""
+    drawing = _Drawing(section)
+    count, pitch_m = 3, length_m / 3
+    kind = "traffic_light" if signals else "priority"
+    for column in range(-1, count + 1):
+        for row in range(-1, count + 1):
+            outside = (column in (-1, count)) + (row in (-1, count))
+            if outside == 2:
+                continue
+            stretch = 0.5 if outside else 1.0  # roads in and out are half a block long
+            at = [
+                pitch_m * (min(max(place, 0), count - 1) + stretch * (place - min(max(place, 0), count - 1)))
+                for place in (column, row)
+            ]
+            drawing.node(f"n_{column}_{row}", (at[0], at[1]), "priority" if outside else kind)
+            if column > -1 and row not in (-1, count):
+                drawing.road(f"h_{column}_{row}", f"n_{column - 1}_{row}", f"n_{column}_{row}")
+            if row > -1 and column not in (-1, count):
+                drawing.road(f"v_{column}_{row}", f"n_{column}_{row - 1}", f"n_{column}_{row}")
+    return drawing.text()
+
+
 _TEMPLATES: Final = MappingProxyType[str, Callable[[CrossSection, float, bool], PlainNetwork]](
     {
         "straight": _straight,
         "curve": _curve,
         "cross": _cross,
         "tee": _tee,
+        "blocks": _blocks,
         "roundabout": _roundabout,
         "motorway": _motorway,
     }

@@ -1,0 +1,429 @@
+"""Street objects that SUMO does not know: parked cars, lights, signals, furniture, trees, buildings, by rules and a seed.
+
+Everything stands beside the road and overlaps nothing: footprints are claimed one by one, and what finds no room is left out.
+The rules of spacing are those of the driving-scene generators this project takes over from, widened to ranges.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from fullwell.assets.records import AssetManifest
+from fullwell.core.errors import unknown_name_message
+from fullwell.core.rng import stream
+from fullwell.traffic.placement import AssetShelf, Footprints, PlacedAsset, Role, footprint
+from fullwell.traffic.ribbons import along, length_m
+from fullwell.traffic.roads import Lane, RoadNetwork
+from fullwell.traffic.sumo import TrafficError
+from fullwell.traffic.surfaces import KERB_HEIGHT_M, GroundPlan, RoadStyle
+
+__all__ = ["CAR_PAINTS", "STYLES", "StreetStyle", "draw_paint", "dress", "street_style"]
+
+Array = NDArray[np.float64]
+
+CAR_PAINTS: Final[Mapping[str, float]] = MappingProxyType(
+    {
+        "paint/white": 21, "paint/black": 19, "paint/grey": 15, "paint/silver": 15, "paint/red": 10, "paint/blue": 8,
+        "paint/brown": 6, "paint/green": 4, "paint/beige": 0.8, "paint/yellow": 0.7, "paint/orange": 0.5,
+    }
+)  # fmt: skip
+"""Popularity of car colours in per cent, as in the driving data sets; "other 2" is spread over three."""
+
+_KEEP_FREE_M: Final = 9.0
+"""Nothing stands this near to the ends of a pavement: corners are for walkers and views."""
+
+
+@dataclass(frozen=True, slots=True)
+class StreetStyle:
+    """How a street is dressed; spacings [m] along each side, 0 for none.
+
+    Attributes
+    ----------
+    light_m, tree_m
+        Between street lights, and least and most between trees.
+    furniture
+        Number of each class per pavement and 100 m.
+    parking_m, parking_share
+        Length of a place in a parking lane, and the share of places that are taken.
+    setback_m
+        Least and most between pavement and buildings.
+    building_gap_m, building_share
+        Least gap between buildings, and the share of sites that are built on.
+    building_tag
+        Only buildings with this tag, where there are any.
+    layers
+        Distant vegetation: (nearest, farthest) [m] from the roads and plants per hectare.
+    gardens
+        Bushes and grass patches per 100 m of building front.
+    surfaces
+        Materials of road, pavement and ground.
+    """
+
+    light_m: float = 24.0
+    light_tag: str = ""
+    tree_m: tuple[float, float] = (0.0, 0.0)
+    furniture: Mapping[str, float] = field(default_factory=dict)
+    parking_m: float = 5.6
+    parking_share: float = 0.7
+    setback_m: tuple[float, float] = (0.4, 1.0)
+    building_gap_m: float = 0.2
+    building_share: float = 1.0
+    building_tag: str = ""
+    layers: tuple[tuple[float, float, float], ...] = ()
+    gardens: float = 0.0
+    surfaces: RoadStyle = field(default_factory=RoadStyle)
+
+
+STYLES: Final[Mapping[str, StreetStyle]] = MappingProxyType(
+    {
+        "city": StreetStyle(
+            light_m=24.0,
+            tree_m=(9.0, 16.0),
+            furniture={
+                "bin": 2.5, "bench": 1.0, "bike_rack": 0.7, "bus_stop": 0.5, "call_box": 0.3, "billboard": 0.3, "clutter": 1.0,
+            },
+            parking_share=0.75,
+            building_tag="city",
+            layers=((60.0, 250.0, 6.0),),
+            surfaces=RoadStyle(ground="concrete/grey"),
+        ),
+        "suburb": StreetStyle(
+            light_m=32.0,
+            tree_m=(8.0, 22.0),
+            furniture={"bin": 1.0, "bench": 0.3, "bus_stop": 0.3, "clutter": 0.3},
+            parking_share=0.35,
+            setback_m=(5.0, 8.0),
+            building_gap_m=4.0,
+            building_share=0.9,
+            building_tag="suburb",
+            layers=((15.0, 60.0, 25.0), (60.0, 250.0, 12.0)),
+            gardens=9.0,
+        ),
+        "rural": StreetStyle(
+            light_m=0.0,
+            tree_m=(10.0, 40.0),
+            setback_m=(12.0, 30.0),
+            building_gap_m=40.0,
+            building_share=0.25,
+            building_tag="suburb",
+            layers=((5.0, 40.0, 40.0), (40.0, 120.0, 60.0), (120.0, 300.0, 40.0)),
+            gardens=4.0,
+            surfaces=RoadStyle(edge_lines=True, zebra=False),
+        ),
+        "motorway": StreetStyle(
+            light_m=0.0,
+            building_share=0.0,
+            layers=((12.0, 40.0, 50.0), (40.0, 120.0, 60.0), (120.0, 300.0, 40.0)),
+            surfaces=RoadStyle(edge_lines=True, zebra=False, road="asphalt/new"),
+        ),
+    }
+)  # fmt: skip
+
+
+def street_style(name: str, *, path: str = "scene.traffic.style") -> StreetStyle:
+    """Return a style; an unknown name raises TrafficError with the nearest."""
+    if name not in STYLES:
+        raise TrafficError(f"{path}: {unknown_name_message('street style', name, STYLES)}", path, name)
+    return STYLES[name]
+
+
+@dataclass(slots=True)
+class _Site:
+    """What all rules share."""
+
+    network: RoadNetwork
+    plan: GroundPlan
+    style: StreetStyle
+    shelf: AssetShelf
+    taken: Footprints
+    seed: int
+    placed: list[PlacedAsset] = field(default_factory=list)
+
+    def rng(self, *names: str | int) -> np.random.Generator:
+        """Return a stream of its own for each rule and lane: one more tree moves no lamp."""
+        return stream(self.seed, "street", *names)
+
+    def put(
+        self, name: str, asset: AssetManifest, role: Role, position_m: Array, yaw_rad: float, *, size_m: Any = None, **more: Any
+    ) -> bool:
+        """Place an asset where its footprint (or `size_m`) is free; return whether it was."""
+        if not self.taken.claim(footprint(position_m, yaw_rad, size_m or asset.size_m, 0.05)):
+            return False
+        self.placed.append(PlacedAsset(name, asset, role, position_m, yaw_rad, **more))
+        return True
+
+
+def dress(
+    network: RoadNetwork, plan: GroundPlan, style: StreetStyle, shelf: AssetShelf, *, seed: int, lights_on: bool = False
+) -> tuple[PlacedAsset, ...]:
+    """Return everything that stands along the roads, in an order that does not change from run to run.
+
+    Parameters
+    ----------
+    shelf
+        What there is to draw; rules for classes that it lacks do nothing.
+    lights_on
+        Whether street lights and windows are lit.
+    """
+    site = _Site(network, plan, style, shelf, Footprints(), seed)
+    for rule in (_signals, _street_lights, _buildings, _furniture, _trees, _parked, _gardens, _layers):
+        rule(site)
+    return tuple(_with_lights(item) for item in site.placed) if lights_on else tuple(site.placed)
+
+
+_LIT: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
+    {"street_light": ("lamp*",), "bus_stop": ("lamp*", "sign_panel*"), "billboard": ("lamp*", "sign_panel*")}
+)
+
+
+def _with_lights(item: PlacedAsset) -> PlacedAsset:
+    patterns = _LIT.get(item.asset.asset_class, ())
+    if item.role == "building":
+        patterns = ("lit_windows*", "shop_windows*", "sign_panel*")
+    names = [part.name for part in item.asset.parts if part.material.name.startswith("lamp/")]
+    lit = tuple(pattern for pattern in patterns if any(fnmatchcase(name, pattern) for name in names))
+    return replace(item, lit=lit) if lit else item
+
+
+# Along pavements -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Side:
+    """One side of a road: the line where its pavement (or the road) ends, and how wide the pavement is."""
+
+    name: str
+    lane: Lane
+    walk_m: float
+
+    @property
+    def whole_m(self) -> float:
+        return length_m(self.lane.centre_m)
+
+    def place(self, along_m: float, from_kerb_m: float) -> tuple[Array, float]:
+        """Return the point (3,) at a distance along the road and from the kerb (outwards), and the road's yaw there."""
+        here, ahead = along(self.lane.centre_m, np.array([along_m, along_m + 0.5]))
+        if along_m + 0.5 > self.whole_m:
+            here, ahead = along(self.lane.centre_m, np.array([along_m - 0.5, along_m]))
+            here, ahead = ahead, 2 * ahead - here
+        direction = (ahead - here)[:2] / max(float(np.linalg.norm((ahead - here)[:2])), 1e-9)
+        right = np.array([direction[1], -direction[0]])
+        point = here.copy()
+        point[:2] += right * (from_kerb_m - self._kerb_to_centre_m)
+        point[2] += KERB_HEIGHT_M if self.walk_m > 0 else 0.0
+        return point, math.atan2(direction[1], direction[0])
+
+    @property
+    def _kerb_to_centre_m(self) -> float:
+        return self.walk_m / 2 if self.walk_m > 0 else -self.lane.width_m / 2
+
+
+def _sides(network: RoadNetwork) -> list[_Side]:
+    """Return both sides of each road by the rightmost lane of each edge; sidewalks where there are any."""
+    rightmost: dict[str, Lane] = {}
+    for lane in network.of_kind("sidewalk", "parking", "bike", "bus", "drive", "shoulder"):
+        if lane.edge_id not in rightmost or lane.index < rightmost[lane.edge_id].index:
+            rightmost[lane.edge_id] = lane
+    return [_Side(edge, lane, lane.width_m if lane.kind == "sidewalk" else 0.0) for edge, lane in sorted(rightmost.items())]
+
+
+def _street_lights(site: _Site) -> None:
+    """Arms over the road, half a metre behind the kerb."""
+    if site.style.light_m <= 0 or not site.shelf.has("street_light"):
+        return
+    rng = site.rng("lights")
+    kind = site.shelf.draw(rng, "street_light", tag=site.style.light_tag) or site.shelf.draw(rng, "street_light")
+    assert kind is not None
+    for side in _sides(site.network):
+        count = max(1, round((side.whole_m - 2 * _KEEP_FREE_M) / site.style.light_m)) if side.whole_m > 2 * _KEEP_FREE_M else 0
+        for number in range(count):
+            along_m = _KEEP_FREE_M + (number + 0.5) * (side.whole_m - 2 * _KEEP_FREE_M) / count
+            # The pivot is the middle of the whole lamp with its arm; the pole is at its back.
+            reach_m = kind.size_m[0] / 2 - 0.15
+            point, yaw = side.place(along_m, 0.5 - reach_m)
+            # Only the pole stands on the ground.
+            pole = (0.3, 0.3, kind.size_m[2])
+            base, _ = side.place(along_m, 0.5)
+            if site.taken.claim(footprint(base, yaw, pole)):
+                name = f"street_light/{side.name}/{number}"
+                site.placed.append(PlacedAsset(name, kind, "light", point, yaw + math.pi / 2))
+
+
+def _signals(site: _Site) -> None:
+    """One traffic light for each approach that a signal controls, at the stop line, facing the drivers."""
+    if not site.shelf.has("traffic_light"):
+        return
+    rng = site.rng("signals")
+    kind = site.shelf.draw(rng, "traffic_light", tag="vehicle") or site.shelf.draw(rng, "traffic_light")
+    assert kind is not None
+    controlled: dict[str, str] = {}
+    lanes = {lane.id: lane for lane in site.network.lanes}
+    for link in site.network.signals:
+        lane = lanes.get(link.from_lane)
+        if lane is not None and not link.crossing and lane.kind in ("drive", "bus"):
+            controlled.setdefault(lane.edge_id, link.signal)
+    for side in _sides(site.network):
+        if side.name in controlled and side.whole_m > 8.0:
+            point, yaw = side.place(side.whole_m - 0.8, 0.6)
+            pole = (0.4, 0.4, kind.size_m[2])
+            if site.taken.claim(footprint(point, yaw, pole)):
+                site.placed.append(PlacedAsset(f"signal/{side.name}", kind, "signal", point, yaw + math.pi))
+
+
+def _trees(site: _Site) -> None:
+    """A row behind the kerb; only trunks claim ground, but crowns keep off facades."""
+    least_m, most_m = site.style.tree_m
+    if most_m <= 0 or not site.shelf.has("tree"):
+        return
+    for side in _sides(site.network):
+        rng = site.rng("trees", side.name)
+        along_m, number = _KEEP_FREE_M + rng.uniform(0.0, most_m), 0
+        from_kerb_m = 0.9 if side.walk_m > 0 else 3.5
+        room_m = 2 * (side.walk_m + site.style.setback_m[0] - from_kerb_m) if site.style.building_share > 0 else math.inf
+        while along_m < side.whole_m - _KEEP_FREE_M:
+            asset = site.shelf.draw(rng, "tree", largest_m=(max(room_m, 3.0) + 1.5,) * 2)
+            if asset is not None:
+                point, _ = side.place(along_m, from_kerb_m)
+                turn = rng.uniform(0.0, 2 * math.pi)
+                name = f"tree/{side.name}/{number}"
+                site.put(name, asset, "vegetation", point, turn, size_m=(0.7, 0.7, asset.size_m[2]))
+            along_m += rng.uniform(least_m, most_m)
+            number += 1
+
+
+def _furniture(site: _Site) -> None:
+    """Seats and stops face the road; the rest turns its front to it as well, at the back of the pavement."""
+    for side in _sides(site.network):
+        if side.walk_m < 1.5 or side.whole_m < 2 * _KEEP_FREE_M + 4.0:
+            continue
+        for asset_class, per_100_m in sorted(site.style.furniture.items()):
+            rng = site.rng("furniture", asset_class, side.name)
+            count = int(rng.poisson(per_100_m * side.whole_m / 100.0))
+            for number in range(count):
+                asset = site.shelf.draw(rng, asset_class, largest_m=(side.walk_m - 1.0, 8.0))
+                along_m = rng.uniform(_KEEP_FREE_M, side.whole_m - _KEEP_FREE_M)
+                if asset is None:
+                    continue
+                at_kerb = asset_class in ("bin", "bus_stop", "bike_rack") or rng.random() < 0.3
+                half_m = asset.size_m[0] / 2
+                from_kerb_m = 0.45 + half_m if at_kerb else side.walk_m - 0.1 - half_m
+                point, yaw = side.place(along_m, from_kerb_m)
+                site.put(f"{asset_class}/{side.name}/{number}", asset, "furniture", point, yaw + math.pi / 2)
+
+
+def _parked(site: _Site) -> None:
+    """Cars in parking lanes, along the road."""
+    for lane in site.network.of_kind("parking"):
+        rng = site.rng("parked", lane.id)
+        whole = length_m(lane.centre_m)
+        count = int((whole - 2 * _KEEP_FREE_M) / site.style.parking_m)
+        for number in range(max(count, 0)):
+            taken = rng.random() < site.style.parking_share
+            kind = "van" if rng.random() < 0.12 else "car"
+            asset = site.shelf.draw(rng, kind, largest_m=(site.style.parking_m - 0.4, lane.width_m + 0.1))
+            along_m = _KEEP_FREE_M + (number + 0.5) * site.style.parking_m + rng.normal(0.0, 0.12)
+            aside_m, turn = rng.normal(0.0, 0.06), rng.normal(0.0, 0.012)
+            paint = draw_paint(rng)
+            if not taken or asset is None:
+                continue
+            here, ahead = along(lane.centre_m, np.array([along_m, along_m + 0.5]))
+            direction = (ahead - here)[:2] / max(float(np.linalg.norm((ahead - here)[:2])), 1e-9)
+            point = here + np.array([-direction[1], direction[0], 0.0]) * aside_m
+            yaw = math.atan2(direction[1], direction[0]) + turn
+            site.put(f"parked/{lane.id}/{number}", asset, "parked", point, yaw, paint=paint)
+
+
+def draw_paint(rng: np.random.Generator) -> str:
+    """Return a car paint by popularity."""
+    names, shares = list(CAR_PAINTS), np.array(list(CAR_PAINTS.values()))
+    return names[int(rng.choice(len(names), p=shares / shares.sum()))]
+
+
+# Beside roads --------------------------------------------------------------------------------------------------------
+
+
+def _buildings(site: _Site) -> None:
+    """A front row along each side, as tight as the style allows; each building faces its street and keeps off all roads."""
+    style = site.style
+    if style.building_share <= 0 or not site.shelf.has("building"):
+        return
+    tag = style.building_tag if site.shelf.has("building", tag=style.building_tag) else ""
+    near = shapely.union_all([site.plan.carriageway, site.plan.walk]).buffer(0.2)
+    shapely.prepare(near)
+    for side in _sides(site.network):
+        rng = site.rng("buildings", side.name)
+        along_m, number = rng.uniform(0.0, 3.0), 0
+        while along_m < side.whole_m:
+            left_m = side.whole_m - along_m
+            asset = site.shelf.draw(rng, "building", tag=tag, largest_m=(math.inf, max(left_m + 4.0, 6.0)))
+            if asset is None:
+                break
+            width_m, depth_m = asset.size_m[1], asset.size_m[0]
+            setback_m = rng.uniform(*style.setback_m)
+            if rng.random() < style.building_share:
+                point, yaw = side.place(along_m + width_m / 2, side.walk_m + setback_m + depth_m / 2)
+                point[2] -= 0.02  # the ground beside the pavement is a little lower
+                outline = footprint(point, yaw + math.pi / 2, asset.size_m)
+                if not near.intersects(outline) and site.put(
+                    f"building/{side.name}/{number}", asset, "building", point, yaw + math.pi / 2
+                ):
+                    along_m += width_m + style.building_gap_m
+                    number += 1
+                    continue
+            along_m += 4.0 if style.building_share >= 1 else width_m / 2 + style.building_gap_m
+            number += 1
+
+
+def _gardens(site: _Site) -> None:
+    """Bushes and grass between pavement and buildings."""
+    if site.style.gardens <= 0:
+        return
+    for side in _sides(site.network):
+        rng = site.rng("gardens", side.name)
+        for number in range(int(rng.poisson(site.style.gardens * side.whole_m / 100.0))):
+            kind = "bush" if rng.random() < 0.55 else "grass"
+            asset = site.shelf.draw(rng, kind)
+            along_m = rng.uniform(2.0, max(side.whole_m - 2.0, 2.1))
+            beyond_m = rng.uniform(0.8, max(site.style.setback_m[0], 1.0))
+            if asset is None:
+                continue
+            half_m = max(asset.size_m[:2]) / 2
+            point, yaw = side.place(along_m, side.walk_m + half_m + beyond_m)
+            point[2] -= 0.03
+            if site.plan.is_free(footprint(point, yaw, asset.size_m)):
+                site.put(f"{kind}/{side.name}/{number}", asset, "vegetation", point, yaw + rng.uniform(-0.2, 0.2))
+
+
+def _layers(site: _Site) -> None:
+    """Plants by distance from the roads: many near, few far, none on the road."""
+    if not site.style.layers or not site.shelf.has("tree"):
+        return
+    roads = shapely.union_all([site.plan.carriageway, site.plan.walk])
+    shapely.prepare(roads)
+    for layer, (nearest_m, farthest_m, per_hectare) in enumerate(site.style.layers):
+        rng = site.rng("layer", layer)
+        west, south, east, north = roads.buffer(farthest_m, quad_segs=2).bounds
+        count = min(int(rng.poisson(per_hectare * (east - west) * (north - south) / 1e4)), _MOST_PLANTS)
+        places = rng.uniform([west, south], [east, north], (count, 2))
+        distances = shapely.distance(roads, shapely.points(places))
+        for number in np.flatnonzero((distances > nearest_m) & (distances <= farthest_m)):
+            kind = "tree" if rng.random() < 0.75 or not site.shelf.has("bush") else "bush"
+            asset = site.shelf.draw(rng, kind)
+            if asset is None:
+                continue
+            point = np.append(places[number], site.plan.heights.at(places[number : number + 1])[0] + KERB_HEIGHT_M - 0.03)
+            trunk = (1.0, 1.0, asset.size_m[2]) if kind == "tree" else asset.size_m
+            name = f"{kind}/layer{layer}/{int(number)}"
+            site.put(name, asset, "vegetation", point, rng.uniform(0.0, 2 * math.pi), size_m=trunk)
+
+
+_MOST_PLANTS: Final = 4000

@@ -1,0 +1,246 @@
+"""A street scene: a network, the traffic of a moment, and everything beside the road."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from fullwell.assets.records import AssetManifest
+from fullwell.core.rng import stream
+from fullwell.traffic.dressing import draw_paint, dress, street_style
+from fullwell.traffic.networks import NetworkSpec, make_network
+from fullwell.traffic.placement import AssetShelf, Footprints, PlacedAsset, footprint
+from fullwell.traffic.roads import RoadNetwork, read_network
+from fullwell.traffic.simulation import (
+    Mover,
+    TrafficDemand,
+    TrafficFrame,
+    TrafficKind,
+    TrafficRun,
+    VehicleModel,
+    read_fcd,
+    simulate,
+)
+from fullwell.traffic.sumo import TrafficError
+from fullwell.traffic.surfaces import KERB_HEIGHT_M, GroundPlan, RoadSurface, ground_plan, road_surfaces
+
+__all__ = ["TRAFFIC_CLASSES", "Street", "StreetMoment", "StreetSpec"]
+
+TRAFFIC_CLASSES: Final[Mapping[TrafficKind, tuple[str, ...]]] = MappingProxyType(
+    {
+        "car": ("car",),
+        "van": ("van", "emergency_vehicle"),
+        "bus": ("bus",),
+        "lorry": ("lorry",),
+        "motorcycle": ("motorcycle",),
+        "cyclist": ("cyclist",),
+        "tram": ("tram",),
+        "pedestrian": ("pedestrian",),
+    }
+)
+"""Asset classes that stand for each kind of traffic."""
+
+_PAINTED: Final = frozenset({"car", "van"})
+
+
+@dataclass(frozen=True, slots=True)
+class StreetSpec:
+    """What street is wanted.
+
+    Attributes
+    ----------
+    network, demand, style
+        Roads, traffic, and the name of a dressing.
+    run_file
+        An fcd-output file of the user's own SUMO run on the network, instead of a demand.
+    times_s
+        The moments of a clip, or one.
+    lamps
+        "day": running lights and what SUMO switches on; "night": headlights, tail lights, street lights and windows too.
+    """
+
+    network: NetworkSpec
+    demand: TrafficDemand = field(default_factory=TrafficDemand)
+    style: str = "city"
+    run_file: Path | None = None
+    times_s: tuple[float, ...] = (60.0,)
+    lamps: str = "day"
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StreetMoment:
+    """A street at one time: all assets, movers first; the state of each signal; what was left out, and why."""
+
+    time_s: float
+    assets: tuple[PlacedAsset, ...]
+    signals: Mapping[str, str]
+    notes: tuple[str, ...]
+
+
+class Street:
+    """A street with its traffic; what stands is made once for all moments. The same spec and shelf make the same street."""
+
+    def __init__(self, spec: StreetSpec, shelf: AssetShelf, *, path: str = "scene.traffic") -> None:
+        self.spec, self._shelf, self._path = spec, shelf, path
+        self._style = street_style(spec.style, path=f"{path}.style")
+        self.network: RoadNetwork = read_network(make_network(spec.network, path=f"{path}.network"), path=f"{path}.network")
+        self.plan: GroundPlan = ground_plan(self.network)
+
+    @cached_property
+    def surfaces(self) -> tuple[RoadSurface, ...]:
+        """Road, pavements, markings, ground."""
+        return tuple(road_surfaces(self.network, self.plan, self._style.surfaces))
+
+    @cached_property
+    def standing(self) -> tuple[PlacedAsset, ...]:
+        """Everything that does not move, signals dark."""
+        night = self.spec.lamps == "night"
+        return dress(self.network, self.plan, self._style, self._shelf, seed=self.spec.seed, lights_on=night)
+
+    @cached_property
+    def run(self) -> TrafficRun:
+        """The traffic at all moments."""
+        spec = self.spec
+        if spec.run_file is not None:
+            frames = read_fcd(spec.run_file, self.network, times_s=spec.times_s, kinds={}, path=f"{self._path}.run")
+            return TrafficRun(frames, ())
+        return simulate(self.network, spec.demand, self._models(), seed=spec.seed, times_s=spec.times_s, path=self._path)
+
+    def _models(self) -> list[VehicleModel]:
+        models = []
+        for kind, classes in TRAFFIC_CLASSES.items():
+            for asset in (asset for name in classes for asset in self._shelf.all(name)):
+                length, width, height = asset.size_m
+                weight = 0.05 if asset.asset_class == "emergency_vehicle" else 1.0
+                models.append(VehicleModel(asset.id, kind, length, width, height, weight))
+        return models
+
+    def moment(self, number: int) -> StreetMoment:
+        """Return the street at the time of that number in the spec."""
+        frame = self.run.frames[number]
+        movers, notes = self._movers(frame)
+        standing = [self._signalled(item, frame.signals) for item in self.standing]
+        kept, hidden = _without_overlaps(movers, standing)
+        if hidden:
+            notes.append(f"{hidden} standing objects were left out where traffic passes through their place.")
+        return StreetMoment(frame.time_s, (*movers, *kept), frame.signals, tuple(notes) + self.run.warnings[:8])
+
+    def _movers(self, frame: TrafficFrame) -> tuple[list[PlacedAsset], list[str]]:
+        taken, placed, dropped = Footprints(), [], 0
+        for mover in frame.movers:
+            asset = self._asset_of(mover)
+            if asset is None:
+                raise TrafficError(
+                    f"{self._path}: there is no asset for a {mover.kind} ({mover.id}). Approve or import one.", self._path
+                )
+            item = self._placed(mover, asset)
+            if taken.claim(footprint(item.position_m, item.yaw_rad, _body(asset))):
+                placed.append(item)
+            else:
+                dropped += 1
+        notes = [f"{dropped} movers overlapped others in SUMO's own positions and were left out."] if dropped else []
+        return placed, notes
+
+    def _asset_of(self, mover: Mover) -> AssetManifest | None:
+        choices = [asset for name in TRAFFIC_CLASSES[mover.kind] for asset in self._shelf.all(name)]
+        named = next((asset for asset in choices if asset.id == mover.model), None)
+        if named is not None or not choices:
+            return named
+        # A type of the user's own: the same mover has the same asset at all moments.
+        return choices[int(stream(self.spec.seed, "asset of", mover.id).integers(len(choices)))]
+
+    def _placed(self, mover: Mover, asset: AssetManifest) -> PlacedAsset:
+        position = mover.centre_m(asset.size_m[0])
+        if mover.kind == "pedestrian" and self._is_on_pavement(position):
+            position[2] += KERB_HEIGHT_M
+        level = math.cos(mover.slope_rad)
+        forward = np.array([level * math.cos(mover.yaw_rad), level * math.sin(mover.yaw_rad), math.sin(mover.slope_rad)])
+        paint = draw_paint(stream(self.spec.seed, "paint", mover.id)) if asset.asset_class in _PAINTED else ""
+        return PlacedAsset(
+            id=mover.id,
+            asset=asset,
+            role="mover",
+            position_m=position,
+            yaw_rad=mover.yaw_rad,
+            slope_rad=mover.slope_rad,
+            lit=self._lit(mover, asset),
+            paint=paint,
+            velocity_m_s=mover.speed_m_s * forward,
+            mover=mover,
+        )
+
+    def _is_on_pavement(self, position_m: NDArray[np.float64]) -> bool:
+        return bool(self.plan.walk.contains(shapely.Point(position_m[:2])))
+
+    def _lit(self, mover: Mover, asset: AssetManifest) -> tuple[str, ...]:
+        signals = mover.signals
+        wanted = ["headlight*", "taillight*"] if self.spec.lamps == "night" else ["drl*"]
+        wanted += ["brakelight*"] if signals.brake else []
+        wanted += ["indicator*left"] if signals.left else []
+        wanted += ["indicator*right"] if signals.right else []
+        wanted += ["reverselight*"] if signals.reverse else []
+        return _present(wanted, asset)
+
+    def _signalled(self, item: PlacedAsset, states: Mapping[str, str]) -> PlacedAsset:
+        if item.role != "signal":
+            return item
+        edge = item.id.removeprefix("signal/")
+        lanes = {lane.id for lane in self.network.lanes if lane.edge_id == edge}
+        links = [link for link in self.network.signals if link.from_lane in lanes and not link.crossing]
+        shown = {states.get(link.signal, "")[link.index : link.index + 1] for link in links}
+        lit = _present(_ASPECTS[next((letter for letter in "GgyurR" if letter in shown), "r")], item.asset)
+        return PlacedAsset(item.id, item.asset, item.role, item.position_m, item.yaw_rad, lit=lit)
+
+
+_ASPECTS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
+    {
+        "G": ("light_green*",),
+        "g": ("light_green*",),
+        "y": ("light_amber*",),
+        "u": ("light_red*", "light_amber*"),
+        "r": ("light_red*",),
+        "R": ("light_red*",),
+    }
+)
+
+
+def _present(patterns: Sequence[str], asset: AssetManifest) -> tuple[str, ...]:
+    """Return the patterns that a lamp of the asset matches: recipes refuse the others."""
+    lamps = [part.name for part in asset.parts if part.material.name.startswith("lamp/")]
+    return tuple(pattern for pattern in patterns if any(fnmatchcase(name, pattern) for name in lamps))
+
+
+def _body(asset: AssetManifest) -> tuple[float, float]:
+    """Return the extents (x, y) that count against others: walkers swing their arms, cars have mirrors."""
+    shrink = 0.6 if asset.asset_class == "pedestrian" else 0.9
+    return asset.size_m[0] * (0.97 if asset.asset_class != "pedestrian" else shrink), asset.size_m[1] * shrink
+
+
+def _without_overlaps(movers: Sequence[PlacedAsset], standing: Sequence[PlacedAsset]) -> tuple[list[PlacedAsset], int]:
+    """Return what stands where nobody is, and how many were left out: furniture gives way to traffic."""
+    taken = Footprints()
+    for item in movers:
+        taken.take(footprint(item.position_m, item.yaw_rad, _body(item.asset)))
+    kept = [item for item in standing if item.role in _FIXED or taken.is_free(_ground(item))]
+    return kept, len(standing) - len(kept)
+
+
+_FIXED: Final = frozenset({"building", "light", "signal"})
+"""They stand where traffic never is, and a pole is thinner than the asset's bounds."""
+
+
+def _ground(item: PlacedAsset) -> Any:
+    if item.asset.asset_class == "tree":
+        return footprint(item.position_m, item.yaw_rad, (0.5, 0.5))
+    return item.outline()
