@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from fullwell.assets.licences import check_licence
 from fullwell.assets.records import LicenceRecord
 from fullwell.core import FieldError, unknown_name_message
 from fullwell.jobs.asset_library import AssetLibrary
@@ -92,7 +93,7 @@ def edit_assets(
 
 def _terms(edits: AssetEdits, now: LicenceRecord) -> LicenceRecord:
     return LicenceRecord(
-        now.spdx if edits.licence is None else edits.licence,
+        now.spdx if edits.licence is None else check_licence(edits.licence),
         now.attribution if edits.attribution is None else edits.attribution,
         now.url if edits.licence_url is None else edits.licence_url,
     )

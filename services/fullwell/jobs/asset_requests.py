@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from fullwell.assets.classes import asset_class
 from fullwell.assets.ingest.options import IngestLimits, IngestOptions
+from fullwell.assets.licences import check_licence
 from fullwell.assets.meshes import MODEL_SUFFIXES
 from fullwell.assets.records import LicenceRecord, check_asset_id, check_tags
 from fullwell.core import FieldError, sha256_hex
@@ -69,14 +70,13 @@ class AssetRequest:
         """Return the request in normal form; FieldError names the first field that is not legal."""
         files = check_files(self.files)
         asset_class(self.asset_class, path="class")
-        _check_texts({"title": self.title, "licence": self.licence.spdx, "attribution": self.licence.attribution})
-        if not self.licence.spdx.strip():
-            raise FieldError("licence is empty; must be an SPDX expression such as CC0-1.0 or CC-BY-4.0.", "licence", "")
+        _check_texts({"title": self.title, "attribution": self.licence.attribution, "licence_url": self.licence.url})
+        licence = replace(self.licence, spdx=check_licence(self.licence.spdx))
         asset_id = check_asset_id(self.id) if self.id else default_asset_id(self.main or main_file(files))
         if asset_id in RESERVED_IDS:
             raise FieldError(f"id is {asset_id!r}, which the service's addresses use. Give another id.", "id", asset_id)
         main = main_file(files, self.main)
-        checked = replace(self, files=files, main=main, id=asset_id, tags=check_tags(self.tags))
+        checked = replace(self, files=files, main=main, id=asset_id, tags=check_tags(self.tags), licence=licence)
         checked.options()  # what ingestion would refuse is refused now
         return checked
 
