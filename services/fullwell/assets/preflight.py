@@ -15,7 +15,7 @@ from PIL import Image
 
 from fullwell.assets.model import ModelError, ModelSource
 
-__all__ = ["PREFLIGHT", "ConfinedFiles", "confined_path"]
+__all__ = ["PREFLIGHT", "ConfinedFiles", "as_utf8", "confined_path"]
 
 _GLTF_READ_EXTENSIONS = frozenset({"KHR_draco_mesh_compression", "KHR_materials_unlit", "EXT_texture_webp"})
 """Extensions that may be *required*; others would leave the geometry or its colours wrong."""
@@ -88,7 +88,7 @@ class ConfinedFiles:
         self.read_files.add(target)
         if target.suffix.lower() in _IMAGE_SUFFIXES:
             self._check_image(reference, content)
-        return content
+        return as_utf8(content) if target.suffix.lower() == ".mtl" else content
 
     def _check_image(self, reference: str, content: bytes) -> None:
         try:
@@ -230,8 +230,18 @@ def _check_obj(source: ModelSource, content: bytes, files: ConfinedFiles) -> byt
         )
     for library in re.findall(rb"^[ \t]*mtllib[ \t]+([^\r\n]+)", content, re.MULTILINE):
         files.check(library.decode("utf-8", "replace"))
+    content = as_utf8(content)
     if _RELATIVE_FACE.search(content):
         return _with_absolute_indices(source, content)
+    return content
+
+
+def as_utf8(content: bytes) -> bytes:
+    """Return text in UTF-8: what is none is taken for Latin-1, in which any bytes are text; it concerns names alone."""
+    try:
+        content.decode("utf-8")
+    except UnicodeDecodeError:
+        return content.decode("latin-1").encode("utf-8")
     return content
 
 

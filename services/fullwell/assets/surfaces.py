@@ -46,6 +46,12 @@ def _texture(source: ModelSource, image: Any, factor: NDArray[np.float64], textu
     return textures[key][1]
 
 
+def _set_texture(surface: SurfaceDraft, pixels: NDArray[np.uint8]) -> None:
+    surface.base_color_srgb = mean_srgb(pixels)
+    # A swatch, one colour in every pixel, needs no coordinates; readers make one up for materials without an image.
+    surface.base_color_texture = None if np.all(pixels == pixels[:1, :1]) else pixels
+
+
 def _metallic_roughness(
     source: ModelSource, name: str, material: Any, warnings: list[str], textures: TextureMemo
 ) -> SurfaceDraft:
@@ -58,8 +64,7 @@ def _metallic_roughness(
         double_sided=bool(material.doubleSided),
     )
     if material.baseColorTexture is not None:
-        surface.base_color_texture = _texture(source, material.baseColorTexture, factor, textures)
-        surface.base_color_srgb = mean_srgb(surface.base_color_texture)
+        _set_texture(surface, _texture(source, material.baseColorTexture, factor, textures))
     if material.metallicRoughnessTexture is not None:
         # Green holds roughness and blue metallic (glTF 2.0, 3.9.2); the renderer takes one number of each.
         channels = pixels_of(source, material.metallicRoughnessTexture).reshape(-1, 3).mean(axis=0) / 255.0
@@ -107,8 +112,7 @@ def _wavefront(source: ModelSource, name: str, material: Any, warnings: list[str
     image = getattr(material, "image", None)
     if image is not None:
         # Writers leave Kd at 0 or 1 beside a texture as they please; the texture is taken as it is, like most readers do.
-        surface.base_color_texture = _texture(source, image, np.ones(3), textures)
-        surface.base_color_srgb = mean_srgb(surface.base_color_texture)
+        _set_texture(surface, _texture(source, image, np.ones(3), textures))
     emission = _numbers(stated.get("ke"), 3)
     if emission and any(emission):
         surface.emissive_srgb = _triple(linear_to_srgb(np.array(emission)))

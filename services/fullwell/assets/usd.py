@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from fullwell.assets.model import ModelSource, PartDraft, SurfaceDraft, UpAxis, VariantSet, linear_to_srgb
 from fullwell.assets.preflight import confined_path
+from fullwell.assets.subdivision import Creases, PolygonMesh, refined
 from fullwell.assets.surfaces import mean_srgb, pixels_of, tinted
 from fullwell.assets.usd_probe import first_line, layer_references, needs_probe, probe, remember_survivor
 from fullwell.core.errors import unknown_name_message
@@ -52,6 +53,18 @@ class _Reading:
     surfaces: dict[str, SurfaceDraft] = field(default_factory=dict)
     references: set[Path] = field(default_factory=set)
     triangles: int = 0
+
+    def count(self, triangles: int) -> None:
+        """Add triangles; raise the error of too many."""
+        self.allow(triangles)
+        self.triangles += triangles
+
+    def allow(self, triangles: int) -> None:
+        """Raise the error of too many where so many more would be."""
+        if self.triangles + triangles > self.source.max_triangles:
+            raise self.source.error(
+                f"holds more than {self.source.max_triangles} triangles", "Simplify the model, or raise max_triangles"
+            )
 
     def warn(self, sentence: str) -> None:
         self.warnings.append(f"{self.source.file.name}: {sentence}")
@@ -270,14 +283,121 @@ def _parts_of(reading: _Reading, stage: Any) -> Iterator[PartDraft]:
                 continue
         if prim.IsA(UsdGeom.PointInstancer):
             walk.PruneChildren()
-            skipped.add("PointInstancer")
-        elif prim.IsA(UsdGeom.Mesh):
             matrix = np.array(transforms.GetLocalToWorldTransform(prim), dtype=np.float64)
-            yield from _mesh_parts(reading, UsdGeom.Mesh(prim), matrix)
+            yield from _instanced_parts(reading, UsdGeom.PointInstancer(prim), matrix, skipped)
         elif prim.IsA(UsdGeom.Gprim):
-            skipped.add(str(prim.GetTypeName()))
+            matrix = np.array(transforms.GetLocalToWorldTransform(prim), dtype=np.float64)
+            yield from _gprim_parts(reading, prim, matrix, skipped)
     if skipped:
         reading.warn(f"prims of type {', '.join(sorted(skipped))} are not read; convert them to meshes.")
+
+
+def _gprim_parts(reading: _Reading, prim: Any, matrix: NDArray[np.float64], skipped: set[str]) -> Iterator[PartDraft]:
+    from pxr import UsdGeom  # noqa: PLC0415
+
+    if prim.IsA(UsdGeom.Mesh):
+        yield from _mesh_parts(reading, UsdGeom.Mesh(prim), matrix)
+        return
+    shape = _solid(prim)
+    if shape is None:
+        skipped.add(str(prim.GetTypeName()))
+        return
+    points, faces = shape
+    vertices, _, mirrored = _placed(points, None, matrix)
+    reading.count(len(faces))
+    surface = _surface_of(reading, UsdGeom.Gprim(prim), prim)
+    yield PartDraft(str(prim.GetPath()), vertices, faces[:, ::-1] if mirrored else faces, None, None, surface)
+
+
+_SIDES = 32
+
+
+def _solid(prim: Any) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
+    """Points and triangles of a cube, sphere, cylinder, cone or capsule, centred as USD has them; None for anything else."""
+    import trimesh  # noqa: PLC0415  (an extra)
+    from pxr import UsdGeom  # noqa: PLC0415
+
+    def number(name: str) -> float:
+        value = float(prim.GetAttribute(name).Get())
+        return value if np.isfinite(value) and value > 0 else 0.0
+
+    axis = "Z"
+    if prim.IsA(UsdGeom.Cube):
+        solid = trimesh.creation.box(extents=[number("size")] * 3)
+    elif prim.IsA(UsdGeom.Sphere):
+        solid = trimesh.creation.icosphere(subdivisions=3, radius=number("radius"))
+    elif prim.IsA(UsdGeom.Cylinder):
+        solid, axis = (
+            trimesh.creation.cylinder(number("radius"), number("height"), sections=_SIDES),
+            prim.GetAttribute("axis").Get(),
+        )
+    elif prim.IsA(UsdGeom.Cone):
+        solid, axis = (
+            trimesh.creation.cone(number("radius"), number("height"), sections=_SIDES),
+            prim.GetAttribute("axis").Get(),
+        )
+    elif prim.IsA(UsdGeom.Capsule):
+        solid = trimesh.creation.capsule(number("height"), number("radius"), count=[_SIDES, _SIDES])
+        axis = prim.GetAttribute("axis").Get()
+    else:
+        return None
+    points = np.asarray(solid.vertices, dtype=np.float64) - np.asarray(solid.bounds).mean(axis=0)
+    # A cyclic change of axes keeps faces outward.
+    order = {"X": [2, 0, 1], "Y": [1, 2, 0]}.get(str(axis), [0, 1, 2])
+    return points[:, order], np.asarray(solid.faces, dtype=np.int64)
+
+
+def _instanced_parts(reading: _Reading, instancer: Any, matrix: NDArray[np.float64], skipped: set[str]) -> Iterator[PartDraft]:
+    """Every prototype's parts, all their instances joined."""
+    from pxr import Usd, UsdGeom  # noqa: PLC0415
+
+    now = Usd.TimeCode.Default()
+    which = _array(instancer.GetProtoIndicesAttr().Get(), np.int64, 1).reshape(-1)
+    kind = UsdGeom.PointInstancer
+    every = instancer.ComputeInstanceTransformsAtTime(now, now, kind.IncludeProtoXform, kind.IgnoreMask)
+    placed = np.array(every, dtype=np.float64).reshape(-1, 4, 4)
+    if len(which) != len(placed):
+        raise reading.source.error(f"has damaged instances in {instancer.GetPath()}", "Export it again")
+    shown = np.array(instancer.ComputeMaskAtTime(now), dtype=bool)
+    if len(shown) == len(which):
+        which = np.where(shown, which, -1)
+    cache = UsdGeom.XformCache(now)
+    stage = instancer.GetPrim().GetStage()
+    for number, target in enumerate(instancer.GetPrototypesRel().GetForwardedTargets()):
+        prototype = stage.GetPrimAtPath(target)
+        copies = placed[which == number]
+        if not prototype or not len(copies):
+            continue
+        for prim in Usd.PrimRange(prototype, Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)):
+            if not prim.IsA(UsdGeom.Gprim) or UsdGeom.Imageable(prim).ComputePurpose() in (
+                UsdGeom.Tokens.proxy,
+                UsdGeom.Tokens.guide,
+            ):
+                continue
+            own = np.eye(4)
+            if prim != prototype:
+                own = np.array(cache.ComputeRelativeTransform(prim, prototype)[0], dtype=np.float64)
+            for draft in _gprim_parts(reading, prim, np.eye(4), skipped):
+                yield _copied(reading, draft, [own @ copy @ matrix for copy in copies])
+
+
+def _copied(reading: _Reading, draft: PartDraft, matrices: list[NDArray[np.float64]]) -> PartDraft:
+    """One part out of several copies of another."""
+    reading.count(len(draft.faces) * (len(matrices) - 1))
+    vertices, normals, faces = [], [], []
+    for number, matrix in enumerate(matrices):
+        points, turned, mirrored = _placed(draft.vertices, draft.normals, matrix)
+        vertices.append(points)
+        faces.append((draft.faces[:, ::-1] if mirrored else draft.faces) + number * len(draft.vertices))
+        if turned is not None:
+            normals.append(turned)
+    return replace(
+        draft,
+        vertices=np.concatenate(vertices),
+        faces=np.concatenate(faces),
+        normals=np.concatenate(normals) if normals else None,
+        uv=None if draft.uv is None else np.tile(draft.uv, (len(matrices), 1)),
+    )
 
 
 def _mesh_parts(reading: _Reading, mesh: Any, matrix: NDArray[np.float64]) -> Iterator[PartDraft]:
@@ -295,26 +415,72 @@ def _mesh_parts(reading: _Reading, mesh: Any, matrix: NDArray[np.float64]) -> It
         raise reading.source.error(
             f"uses vertex {int(indices.max())} in {path}, which has {len(points)} points", "Export the mesh again"
         )
+    uv = _uv(mesh, counts, indices)
+    normals = _normals(mesh, counts, indices)
+    face_count = len(counts)
+    parent: NDArray[np.int64] | None = None
+    if _is_subdivision(mesh, has_normals=normals is not None):
+        reading.subdivision_meshes += 1
+        if reading.subdivide:
+            fine = _refined(reading, mesh, PolygonMesh(points, counts, indices, uv, np.arange(face_count)))
+            points, counts, indices, uv, parent, normals = fine.points, fine.counts, fine.indices, fine.uv, fine.parent, None
     corners, face_of = _fan(counts)
-    reading.triangles += len(corners)
-    if reading.triangles > reading.source.max_triangles:
-        raise reading.source.error(
-            f"holds more than {reading.source.max_triangles} triangles", "Simplify the model, or raise max_triangles"
-        )
+    face_of = face_of if parent is None else parent[face_of]
+    reading.count(len(corners))
     hole = mesh.GetHoleIndicesAttr().Get()
     if hole is not None and len(hole):
         keep = ~np.isin(face_of, np.asarray(hole, dtype=np.int64))
         corners, face_of = corners[keep], face_of[keep]
-    uv = _uv(mesh, counts, indices)
-    normals = _normals(mesh, counts, indices)
     vertices, normals, flip = _placed(points, normals, matrix)
     if (mesh.GetOrientationAttr().Get() == "leftHanded") != flip:
         corners = corners[:, ::-1]
-    for name, prim, faces in _subsets(mesh, len(counts)):
+    for name, prim, faces in _subsets(mesh, face_count):
         chosen = corners[faces[face_of]]
         if len(chosen):
             surface = _surface_of(reading, mesh, prim)
             yield _draft(f"{path}{name}", surface, _Corners(vertices, indices, normals, uv), chosen)
+
+
+def _is_subdivision(mesh: Any, *, has_normals: bool) -> bool:
+    """Whether a mesh is a control mesh: it says so, or says nothing (USD's default) and has no normals of its own."""
+    attribute = mesh.GetSubdivisionSchemeAttr()
+    scheme = str(attribute.Get())
+    return scheme != "none" and (bool(attribute.HasAuthoredValue()) or not has_normals)
+
+
+def _refined(reading: _Reading, mesh: Any, control: PolygonMesh) -> PolygonMesh:
+    scheme = str(mesh.GetSubdivisionSchemeAttr().Get())
+    if scheme == "loop":
+        reading.warn(f"{mesh.GetPath()} is subdivided by Loop's scheme, which is not read; its control mesh is drawn.")
+        return control
+    # Four faces out of each corner at each level, two triangles each.
+    reading.allow(2 * len(control.indices) * 4 ** (reading.subdivide - 1))
+    keep = control.counts >= 3
+    if not keep.all():
+        corner = np.repeat(keep, control.counts)
+        uv = None if control.uv is None else control.uv[corner]
+        control = PolygonMesh(control.points, control.counts[keep], control.indices[corner], uv, control.parent[keep])
+    return refined(control, reading.subdivide, creases=_creases(mesh, len(control.points)), smooth=scheme == "catmullClark")
+
+
+def _creases(mesh: Any, points: int) -> Creases:
+    """Creases as pairs of points: USD lists them as chains, with a sharpness for each chain or each edge."""
+    chains = _array(mesh.GetCreaseIndicesAttr().Get(), np.int64, 1).reshape(-1)
+    lengths = _array(mesh.GetCreaseLengthsAttr().Get(), np.int64, 1).reshape(-1)
+    stated = _array(mesh.GetCreaseSharpnessesAttr().Get(), np.float64, 1).reshape(-1)
+    corners = _array(mesh.GetCornerIndicesAttr().Get(), np.int64, 1).reshape(-1)
+    edge_counts = lengths - 1
+    if len(lengths) == 0 or lengths.min() < 2 or lengths.sum() != len(chains) or chains.min() < 0 or chains.max() >= points:
+        return replace(Creases.none(), corners=corners)
+    last = np.cumsum(lengths) - 1
+    starts = np.ones(len(chains), dtype=bool)
+    starts[last] = False
+    first = np.flatnonzero(starts)
+    if len(stated) == len(lengths):
+        stated = np.repeat(stated, edge_counts)
+    if len(stated) != len(first):
+        stated = np.full(len(first), 10.0)  # USD's "infinitely sharp"
+    return Creases(np.stack([chains[first], chains[first + 1]], axis=1), np.nan_to_num(stated, nan=0.0), corners)
 
 
 def _array(value: Any, dtype: Any, width: int) -> NDArray[Any]:

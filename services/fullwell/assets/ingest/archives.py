@@ -32,10 +32,7 @@ def unpack(archive: Path, folder: Path, limits: IngestLimits) -> list[Path]:
     with _opened(archive) as entries:
         wanted = _checked_entries(archive, entries, limits)
         for entry in wanted:
-            target = folder / entry.filename
-            target.parent.mkdir(parents=True, exist_ok=True)
-            with entries.open(entry) as packed, target.open("xb") as plain:
-                _copy(archive, entry, packed, plain)
+            _unpack_entry(archive, entries, entry, folder / entry.filename)
         return [Path(entry.filename) for entry in wanted]
 
 
@@ -109,20 +106,29 @@ def _check_entry(archive: Path, info: zipfile.ZipInfo, limits: IngestLimits) -> 
         raise _refused(archive, name, f"unpacks to {ratio:.0f} times its size", f"Up to {limits.archive_ratio:g} is allowed")
 
 
-def _copy(archive: Path, entry: zipfile.ZipInfo, packed: IO[bytes], plain: IO[bytes]) -> None:
-    left = entry.file_size
+def _unpack_entry(archive: Path, entries: zipfile.ZipFile, entry: zipfile.ZipInfo, target: Path) -> None:
     try:
-        while piece := packed.read(min(_CHUNK, left + 1)):
-            left -= len(piece)
-            if left < 0:
-                raise _refused(archive, entry.filename, "is larger than the archive states", "Pack it again")
-            plain.write(piece)
-    except IngestError:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with entries.open(entry) as packed, target.open("xb") as plain:
+            left = _copy(packed, plain, entry.file_size)
+    except (MemoryError, KeyboardInterrupt):
         raise
-    except Exception as error:  # zlib, checksum and format errors of many classes
+    except Exception as error:  # zlib, checksum, format and file name errors of many classes
         raise _refused(archive, entry.filename, f"is damaged ({type(error).__name__}: {error})", "Pack it again") from error
     if left:
-        raise _refused(archive, entry.filename, "is cut short", "Copy or pack it again")
+        what = "is cut short" if left > 0 else "is larger than the archive states"
+        raise _refused(archive, entry.filename, what, "Copy or pack it again")
+
+
+def _copy(packed: IO[bytes], plain: IO[bytes], size: int) -> int:
+    """Copy what is stated; return what is missing then, negative where there is more."""
+    left = size
+    while piece := packed.read(min(_CHUNK, left + 1)):
+        left -= len(piece)
+        if left < 0:
+            break
+        plain.write(piece)
+    return left
 
 
 def _refused(archive: Path, name: str, what: str, next_step: str) -> IngestError:

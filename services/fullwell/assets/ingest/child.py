@@ -14,7 +14,6 @@ import os
 import resource
 import signal
 import sys
-import threading
 import traceback
 from pathlib import Path
 from typing import Any, Final
@@ -39,7 +38,7 @@ def main(arguments: list[str]) -> None:
     _confine(limits.memory_bytes, limits.output_bytes)
     orders = os.fdopen(os.dup(0), "rb")
     _close_standard_input()
-    threading.Thread(target=_warm_up, daemon=True).start()
+    _warm_up()
     for line in orders:
         order = json.loads(line)
         answers.send({"taken": order["serial"]})
@@ -130,7 +129,7 @@ def _close_standard_input() -> None:
 
 
 def _warm_up() -> None:
-    """Import what reading needs while the first order is on its way."""
+    """Import what reading needs. Not in a thread beside the first order: USD's modules do not survive being imported twice."""
     import importlib  # noqa: PLC0415
 
     for name in ("fullwell.assets.ingest.prepare", *_MODEL_LIBRARIES):

@@ -32,6 +32,7 @@ _SMALLEST_PART: Final = 8
 
 _MOST_SAMPLES: Final = 20_000
 _SAMPLES_PER_TRIANGLE: Final = 12
+_MOST_LOOKED_AT: Final = 12_000
 _CANDIDATES: Final = 4
 _TURNED_PENALTY: Final = 0.05
 """Of the diagonal: how much farther a triangle facing away counts, so that thin sheets take values from their own side."""
@@ -188,12 +189,13 @@ def _two_way(fine: _Surface, rough: _Surface) -> tuple[float, float]:
 
 
 def _looked_at(surface: _Surface) -> Array:
-    """Corners, middles of edges and of triangles, each once."""
+    """Corners, middles of edges and of triangles, each once; of large meshes an even share of them."""
     corners = surface.corners
     middles = (corners + np.roll(corners, -1, axis=1)) / 2
     every = np.concatenate([corners.reshape(-1, 3), middles.reshape(-1, 3), corners.mean(axis=1)])
     at = places(every.astype(np.float32).astype(np.float64))
-    return every[np.unique(at, return_index=True)[1]]
+    first = np.unique(at, return_index=True)[1]
+    return every[first[:: -(-len(first) // _MOST_LOOKED_AT)]]
 
 
 def _uv_of(part: LoadedPart, surface: _Surface, vertices: Array, faces: NDArray[np.int64]) -> Array:

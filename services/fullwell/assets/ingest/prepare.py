@@ -82,6 +82,7 @@ def prepare_file(
     limits = limits or IngestLimits()
     say = progress or (lambda share, stage: None)
     say(0.0, "read")
+    source: _Source | None = None
     try:
         with _model_files(files_dir, main, options, limits) as source:
             model = _loaded(source, options, limits, isolated=isolated)
@@ -89,7 +90,10 @@ def prepare_file(
     except IngestError:
         raise
     except FieldError as error:
-        raise IngestError(error.message, error.path or "file", error.value) from error
+        # Where the files happen to lie is nobody's business: uploads are in a temporary folder.
+        place = f"{source.root}/" if source is not None else f"{files_dir.resolve()}/"
+        value = error.value.replace(place, "") if isinstance(error.value, str) else error.value
+        raise IngestError(error.message.replace(place, ""), error.path or "file", value) from error
     except MemoryError as error:
         raise IngestError(f"{main} needs more memory than there is. Simplify the model.", "file", main, "memory") from error
     return _assembled(model, source, files, options, say)
@@ -144,7 +148,7 @@ def _loaded(source: _Source, options: IngestOptions, limits: IngestLimits, *, is
         )
     except ModelError:
         raise
-    except (RecursionError, OSError, ValueError, ArithmeticError, LookupError, TypeError, AttributeError) as error:
+    except (RecursionError, OSError, ValueError, ArithmeticError, LookupError, TypeError) as error:
         # Readers are fed damaged files here and answer with whatever their arithmetic raised.
         said = f"{type(error).__name__}: {error}".splitlines()[0][:200]
         raise IngestError(
