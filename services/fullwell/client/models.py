@@ -42,7 +42,8 @@ MAX_TEXT_BYTES: Final = 200_000_000
 MAX_SIDE_FILES: Final = 5000
 
 _OBJ = re.compile(r"^\s*mtllib\s+(.+?)\s*$", re.MULTILINE | re.IGNORECASE)
-_MTL = re.compile(r"^\s*(?:map_\w+|bump|disp|norm)\s+(?:-\S+\s+\S+\s+)*(.+?)\s*$", re.MULTILINE | re.IGNORECASE)
+_MTL_OPTION = r"-\w+(?:\s+(?:[-+.\d]+|on|off|[a-z]))+\s+"
+_MTL = re.compile(rf"^\s*(?:map_\w+|bump|disp|norm)\s+(?:{_MTL_OPTION})*(.+?)\s*$", re.MULTILINE | re.IGNORECASE)
 _USD = re.compile(rb"@([^@\n]{1,500})@")
 
 
