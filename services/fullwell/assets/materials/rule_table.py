@@ -84,7 +84,7 @@ _BARE_METALS: Final = _all("metal", "chrome", "aluminium", "steel", "steel_galva
 _SIGNALS: Final = _all("lamp", "traffic_red", "traffic_amber", "traffic_green")
 _CAR_LAMPS: Final = _all("lamp", "headlight_led", "tail", "indicator")
 
-_DRAWN: Final = 32.0
+_DRAWN: Final = 18.0
 """Farthest colour at which a rule about the class alone still decides: beyond it the thing is of another kind."""
 
 MATERIAL_RULES: Final[tuple[MaterialRule, ...]] = (
@@ -214,7 +214,7 @@ MATERIAL_RULES: Final[tuple[MaterialRule, ...]] = (
         words=_words("wheel"),
         classes=("vehicle", "cyclist", "other"),
         without=_words("steering, wheelchair, arch, wheelhouse"),
-        largest_distance=40.0,
+        largest_distance=15.0,
     ),
     MaterialRule("Chrome, named so.", ("metal/chrome",), words=_words("chrome, exhaust, tailpipe, muffler"), over_texture=True),
     MaterialRule(
@@ -434,7 +434,7 @@ MATERIAL_RULES: Final[tuple[MaterialRule, ...]] = (
         "What is not named on a person is taken as clothing or skin.",
         (*_CLOTHS, *_SKINS),
         classes=("person", "cyclist"),
-        largest_distance=_DRAWN,
+        largest_distance=28.0,
     ),
     MaterialRule("What is not named on an animal is taken as fur.", _FURS, classes=("animal",), largest_distance=_DRAWN),
     MaterialRule(
