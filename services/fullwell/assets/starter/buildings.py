@@ -393,7 +393,7 @@ class SlabStyle:
         shutter_material="plastic/grey",
     )
     pitch_m: float = 3.4
-    window_m: tuple[float, float] = (1.8, 1.35)
+    window_m: tuple[float, float] = (2.1, 1.45)
     balcony: Balcony | None = Balcony(1.3, "panels", "coating/blue")
     joints: bool = True
     roof: Literal["flat", "gable"] = "flat"
@@ -537,7 +537,7 @@ def office(
     ground_m: float = 4.2,
     module_m: float = 1.5,
     frame_material: str = "metal/aluminium",
-    spandrel_material: str = "glass/tinted",
+    spandrel_material: str = "coating/grey",
     wall: str = "concrete/light",
     tags: tuple[str, ...] = (),
 ) -> BuiltAsset:
@@ -610,7 +610,7 @@ def _glass_storey(facade: Facade, low: float, storey_m: float, module_m: float, 
             z = low + storey_m - 0.03
             x = 0.02
             sheet = [(x, a + 0.04, z - drop), (x, b - 0.04, z - drop), (x, b - 0.04, z), (x, a + 0.04, z)]
-            facade.assembly.add("curtains", "plaster/grey", quads([sheet]))
+            facade.assembly.add("curtains", "coating/grey", quads([sheet]))
     inner = edges[1:-1]
     count = len(inner)
     mullions = boxes(
@@ -856,7 +856,7 @@ def _house_roof(house: _House, style: HouseStyle, top: float) -> float:
             y,
             top + back * tangent + 0.12,
             replace(kind, depth_m=2.0 / tangent + 0.2),
-            replace(style.look, head="none"),
+            _plain(style.look),
             house.panes,
             rng,
         )
@@ -975,7 +975,7 @@ def terraced_house(
     if chosen.stepped_gable:
         height = _stepped_gable(house, chosen, top, ridge)
     else:
-        for y in (-width_m / 2 + 0.32, width_m / 2 - 0.32):
+        for y in (-width_m / 2 + 0.47, width_m / 2 - 0.47):
             chimney(house.assembly, -0.3, y, ridge - 1.5, ridge + 1.0, material=chosen.wall, pots=1)
         height = ridge + 1.6
     house.downpipes(top - 0.2)
@@ -1225,7 +1225,7 @@ _MILL = WindowLook(
     transom=0.7,
     bars=2,
     frame_m=0.04,
-    frame_material="coating/black",
+    frame_material="coating/white",
     sill_m=0.06,
     head="soldier",
     curtains=0.08,

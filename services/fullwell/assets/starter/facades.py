@@ -232,7 +232,7 @@ class Facade:
             wide = self.rng.uniform(0.12, 0.24) * (right - left)
             strips = [(left, left + wide, low, high), (right - wide, right, low, high)]
         corners = [[(x, a, c), (x, b, c), (x, b, d), (x, a, d)] for a, b, c, d in strips]
-        self.assembly.add("curtains", "plaster/grey", quads(corners))
+        self.assembly.add("curtains", "coating/grey", quads(corners))
 
     def _surround(self, opening: Opening, look: WindowLook) -> None:
         left, right, low, high = opening.left_m, opening.right_m, opening.bottom_m, opening.top_m
@@ -259,7 +259,7 @@ class Facade:
     def _shutters(self, opening: Opening, look: WindowLook) -> None:
         left, right, low, high = opening.left_m, opening.right_m, opening.bottom_m, opening.top_m
         if look.shutters == "hinged":
-            wide = opening.width_m / 2
+            wide = min(opening.width_m / 2, 0.62)
             for start in (left - wide - 0.04, right + 0.04):
                 self.assembly.add("shutters", look.shutter_material, _louvred_leaf(start, start + wide, low, high))
         elif look.shutters == "roller":
