@@ -41,8 +41,9 @@ format: $(STAMPS)/dev ## Let ruff write the code's layout
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-tools: ## The S3 server that tests use
+tools: ## The S3 server and the browser that tests use
 	@bash .ci/install-versitygw
+	@bash .ci/install-chromium
 
 images: ## Build the container images
 	docker build -f api/Dockerfile -t fullwell-api .
