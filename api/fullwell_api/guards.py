@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 from fastapi import Depends, Request
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 from starlette.exceptions import HTTPException
-from starlette.requests import Request as PlainRequest
+from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Send
 from starlette.types import Scope as RequestScope
 
@@ -24,7 +24,7 @@ SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 LOCAL_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
 BLOBS = "/v1/blobs"
 
-UPLOADS: Final = ("/v1/assets", "/v1/assets/archives")
+UPLOADS: Final = ("/v1/assets", "/v1/assets/archives", "/assets/files")
 """Routes whose POST takes whole files in one body."""
 
 Scope: TypeAlias = Literal["use", "curate"]
@@ -152,19 +152,25 @@ class HostGuard:
         self._names = names
 
     async def __call__(self, scope: RequestScope, receive: Receive, send: Send) -> None:
-        """Serve one request."""
-        if scope["type"] == "http" and (refusal := self._refusal(PlainRequest(scope))) is not None:
+        """Serve one request or socket."""
+        refusal = self._refusal(HTTPConnection(scope)) if scope["type"] in ("http", "websocket") else None
+        if refusal is None:
+            await self._app(scope, receive, send)
+        elif scope["type"] == "websocket":
+            # Closed before it was accepted: the server answers 403.
+            await receive()
+            await send({"type": "websocket.close", "code": 1008, "reason": "refused"})
+        else:
             status, detail = refusal
             await problem_response(status, detail, instance=scope["path"])(scope, receive, send)
-            return
-        await self._app(scope, receive, send)
 
-    def _refusal(self, request: PlainRequest) -> tuple[int, str] | None:
+    def _refusal(self, request: HTTPConnection) -> tuple[int, str] | None:
         host = request.headers.get("host", "")
         name = _host_name(host)
         if self._names and name not in self._names:
             return 421, f"this service does not answer to the name {name[:100]!r}; FULLWELL_ALLOWED_HOSTS sets its names"
-        if request.method in SAFE_METHODS:
+        # A socket can change things, and browsers let any page open one.
+        if request.scope.get("method") in SAFE_METHODS:
             return None
         origin: Any = request.headers.get("origin")
         foreign = origin is not None and urlsplit(origin).netloc != host

@@ -57,7 +57,7 @@ from fullwell_api.guards import Curator
 from fullwell_api.services import ServiceParts, Services
 from fullwell_api.uploads import received_file, stored_upload
 
-__all__ = ["router"]
+__all__ = ["queue_import", "queue_previews", "router"]
 
 router = APIRouter(tags=["assets"])
 
@@ -121,7 +121,7 @@ async def import_asset(
     else:
         raise HTTPException(415, "send multipart/form-data with the files, or application/json that names uploaded blobs")
     wanted = given.request()
-    record = await run_in_threadpool(_queue_import, parts, wanted, caller.name, idempotency_key)
+    record = await run_in_threadpool(queue_import, parts, wanted, caller.name, idempotency_key)
     response.headers["Location"] = record.links.self
     return record
 
@@ -145,7 +145,8 @@ async def _from_form(request: Request, parts: Services) -> AssetImport:
     return _validated(AssetImport, json.dumps(fields))
 
 
-def _queue_import(parts: Services, wanted: AssetRequest, who: str, idempotency_key: str | None) -> IngestionOut:
+def queue_import(parts: Services, wanted: AssetRequest, who: str, idempotency_key: str | None) -> IngestionOut:
+    """Queue the ingestion of uploaded files. Raises FieldError where one of them has not been uploaded."""
     # Held before they are looked for: what is there now stays until the ingestion's row refers to it.
     parts.library.hold(wanted.files.values())
     check_blobs(parts, wanted.files)
@@ -429,12 +430,17 @@ def get_preview(asset_id: AssetId, name: str, request: Request, parts: ServicePa
 @router.post("/assets/{asset_id}/previews", status_code=202, summary="Render the pictures of an asset again")
 def render_previews(asset_id: AssetId, response: Response, parts: ServiceParts, caller: Curator) -> IngestionOut:
     """Queue new pictures of the newest version; the present ones stay until then."""
-    entry = parts.library.get(asset_id)
+    record = queue_previews(parts, parts.library.get(asset_id), caller.name)
+    response.headers["Location"] = record.links.self
+    return record
+
+
+def queue_previews(parts: Services, entry: AssetEntry, who: str) -> IngestionOut:
+    """Queue the rendering of a version's pictures."""
     text = json.dumps({"asset": entry.id, "version": entry.version})
     stored = StoredAsset(entry.id, entry.version)
-    record, _ = parts.ingestions.create(NewIngestion("previews", entry.id, caller.name, text, digest_of([text]), stored=stored))
+    record, _ = parts.ingestions.create(NewIngestion("previews", entry.id, who, text, digest_of([text]), stored=stored))
     parts.dispatcher.wake()
-    response.headers["Location"] = f"/v1/assets/ingestions/{record.id}"
     return ingestion_out(record)
 
 
