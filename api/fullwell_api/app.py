@@ -18,6 +18,7 @@ from fullwell_api.problems import PROBLEM_RESPONSES, add_problem_handlers
 from fullwell_api.routes import assets, blobs, catalog, health, jobs, products, recipes
 from fullwell_api.services import Services, make_services
 from fullwell_api.web import pages
+from fullwell_api.web.curation import mount_curation
 
 __all__ = ["create_app"]
 
@@ -41,6 +42,7 @@ def create_app(
         app.include_router(router, prefix="/v1", dependencies=[Depends(require_key)], responses=PROBLEM_RESPONSES)
     app.include_router(health.router)
     app.include_router(pages.router)
+    mount_curation(app, services)
     app.add_middleware(SizeLimit, settings=services.settings)
     app.add_middleware(HostGuard, settings=services.settings)
     app.add_middleware(RequestMeter, metrics=app.state.metrics)
