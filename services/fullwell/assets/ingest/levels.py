@@ -34,6 +34,11 @@ _MOST_SAMPLES: Final = 20_000
 _SAMPLES_PER_TRIANGLE: Final = 12
 _MOST_LOOKED_AT: Final = 12_000
 _CANDIDATES: Final = 4
+_CANDIDATES_CLOSELY: Final = 48
+_CLOSELY_AT_ONCE: Final = 256
+_NEGLIGIBLE: Final = 1e-4
+"""Of the diagonal: distances that need not be known more closely."""
+
 _TURNED_PENALTY: Final = 0.05
 """Of the diagonal: how much farther a triangle facing away counts, so that thin sheets take values from their own side."""
 
@@ -157,12 +162,12 @@ def _surface_of(vertices: Array, faces: NDArray[np.int64]) -> _Surface:
     return _Surface(corners, normals, float(area.sum()), np.concatenate(owners), tree)
 
 
-def _nearest(surface: _Surface, points: Array) -> tuple[NDArray[np.int64], Array]:
+def _nearest(surface: _Surface, points: Array, *, candidates: int = _CANDIDATES) -> tuple[NDArray[np.int64], Array]:
     """(n, k) triangles that are candidates for the nearest of each point, and their true distances."""
-    count = min(_CANDIDATES, len(surface.sampled))
+    count = min(candidates, len(surface.sampled))
     _, found = surface.tree.query(points, k=count)
-    candidates = surface.sampled[np.asarray(found).reshape(len(points), count)]
-    return candidates, _distances(surface, candidates, points)
+    triangles = surface.sampled[np.asarray(found).reshape(len(points), count)]
+    return triangles, _distances(surface, triangles, points)
 
 
 def _distances(surface: _Surface, candidates: NDArray[np.int64], points: Array) -> Array:
@@ -179,7 +184,17 @@ def surface_distance_m(part: LoadedPart, points_m: Array) -> float:
 
 
 def _farthest(surface: _Surface, points: Array) -> float:
-    return float(_nearest(surface, points)[1].min(axis=1).max())
+    """Largest distance of any point. A few candidates give bounds; only the largest of these are then looked at closely."""
+    bound = _nearest(surface, points)[1].min(axis=1)
+    order = np.argsort(-bound, kind="stable")
+    negligible = _NEGLIGIBLE * float(np.linalg.norm(np.ptp(surface.corners.reshape(-1, 3), axis=0)))
+    worst = 0.0
+    for start in range(0, len(order), _CLOSELY_AT_ONCE):
+        some = order[start : start + _CLOSELY_AT_ONCE]
+        if bound[some[0]] <= max(worst, negligible):
+            return max(worst, float(bound[some[0]]))
+        worst = max(worst, float(_nearest(surface, points[some], candidates=_CANDIDATES_CLOSELY)[1].min(axis=1).max()))
+    return worst
 
 
 def _two_way(fine: _Surface, rough: _Surface) -> tuple[float, float]:

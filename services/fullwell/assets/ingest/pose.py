@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -379,8 +380,10 @@ def _reddish(part: LoadedPart, words: frozenset[str]) -> bool:
 
 
 def _words(name: str) -> frozenset[str]:
+    """Words of a name, and each two that follow each other as one: "HeadLight.L" holds head, light, headlight."""
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
-    return frozenset(re.findall(r"[a-z]+", spaced.casefold()))
+    words = re.findall(r"[a-z]+", spaced.casefold())
+    return frozenset(words) | frozenset(first + second for first, second in pairwise(words))
 
 
 def _triple(values: Array) -> Triple:
