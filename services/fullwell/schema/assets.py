@@ -13,9 +13,30 @@ from fullwell.core.errors import FieldError
 from fullwell.schema.errors import RecipeError
 from fullwell.schema.v1.geometry import AssetGeometry
 from fullwell.schema.v1.recipe import RecipeDocument
+from fullwell.schema.v1.traffic import TrafficDocument
 from fullwell.schema.variation import extreme_values
 
-__all__ = ["AssetSource", "StoredAssetFiles", "asks_for_assets", "pin_assets", "pins_of", "split_pin"]
+__all__ = [
+    "AssetSource",
+    "StoredAssetFiles",
+    "asks_for_assets",
+    "candidates_of",
+    "no_candidate",
+    "pin_assets",
+    "pins_of",
+    "query_of",
+    "split_pin",
+    "traffic_queries",
+]
+
+TRAFFIC_PATH = "scene.traffic"
+
+STREET_CLASSES = (
+    "barrier", "bench", "bicycle", "bike_rack", "billboard", "bin", "building", "bus", "bus_stop", "bush", "call_box", "car",
+    "clutter", "cone", "cyclist", "deer", "dog", "emergency_vehicle", "grass", "lorry", "motorcycle", "pedestrian", "rock",
+    "street_light", "traffic_light", "traffic_sign", "trailer", "tram", "tree", "van",
+)  # fmt: skip
+"""Asset classes that streets are made of; a class of which the store has nothing is left out of the scene."""
 
 _PIN = re.compile(r"(?P<id>[a-z0-9._-]{1,80})@(?P<digest>[0-9a-f]{64})")
 
@@ -49,7 +70,7 @@ def split_pin(pin: str, path: str) -> tuple[str, str]:
     return match["id"], match["digest"]
 
 
-def pins_of(document: RecipeDocument, query: AssetQuery, path: str) -> tuple[tuple[str, str], ...] | None:
+def pins_of(document: RecipeDocument, query: AssetQuery) -> tuple[tuple[str, str], ...] | None:
     """Return the pins that a recipe holds for a query, None where it holds none."""
     pins = document.assets.get(query.key)
     return None if pins is None else tuple(split_pin(pin, f"assets[{query.key!r}]") for pin in pins)
@@ -65,7 +86,7 @@ def pin_assets(document: RecipeDocument, source: AssetSource) -> RecipeDocument:
     for path, query in _queries(document):
         if query.key not in pins:
             found = source.candidates(query)
-            if not found:
+            if not found and path != TRAFFIC_PATH:
                 raise RecipeError(no_candidate(path, query), path)
             pins[query.key] = [f"{name}@{digest}" for name, digest in found]
     if pins == document.assets:
@@ -79,6 +100,8 @@ def asks_for_assets(document: RecipeDocument) -> bool:
     """Return whether a recipe has assets, or `vary` may give it some."""
     geometries = [item.geometry for item in document.scene.objects]
     geometries += [part.geometry for item in document.scene.objects for part in item.parts or []]
+    if document.scene.traffic is not None:
+        return True
     if any(isinstance(geometry, AssetGeometry) for geometry in geometries):
         return True
     return document.vary is not None and '"asset"' in document.vary.model_dump_json()
@@ -107,11 +130,37 @@ def _queries(document: RecipeDocument) -> Iterator[tuple[str, AssetQuery]]:
     yield from _queries_in(document)
     if document.vary is not None:
         for _, path, value in extreme_values(document.vary):
-            if ".geometry" in path or ".parts" in path or path.startswith("scene.objects"):
+            if path.startswith(("scene.objects", "scene.traffic")):
                 yield from _queries_in(varied_document(document, {path: value}))
 
 
+def traffic_queries(document: TrafficDocument) -> tuple[AssetQuery, ...]:
+    """Return what a traffic scene may draw: everything of the classes that move, or stand beside roads."""
+    return tuple(
+        AssetQuery(asset_class=name, licences=tuple(sorted(document.licence)), states=tuple(sorted(set(document.state))))
+        for name in STREET_CLASSES
+    )
+
+
+def candidates_of(
+    document: RecipeDocument | None, assets: StoredAssetFiles, query: AssetQuery, path: str
+) -> tuple[tuple[str, str], ...]:
+    """Return (id, digest) of what a draw chooses among: the recipe's pins, or what the catalogue holds now.
+
+    Raises RecipeError for `path` where there are neither pins nor a catalogue.
+    """
+    pins = None if document is None else pins_of(document, query)
+    if pins is not None:
+        return pins
+    if not isinstance(assets, AssetSource):
+        sentence = "draws assets, but the recipe holds no pins and no catalogue is at hand here. Submit it to a service."
+        raise RecipeError(f"{path} {sentence}", path)
+    return tuple(assets.candidates(query))
+
+
 def _queries_in(document: RecipeDocument) -> Iterator[tuple[str, AssetQuery]]:
+    if document.scene.traffic is not None:
+        yield from ((TRAFFIC_PATH, query) for query in traffic_queries(document.scene.traffic))
     for index, item in enumerate(document.scene.objects):
         path = f"scene.objects[{index}]"
         geometries = [(f"{path}.geometry", item.geometry)]

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from fullwell.schema.assets import StoredAssetFiles
     from fullwell.schema.conversion.context import Context, RecipeFiles
     from fullwell.schema.conversion.scenes import PlacedScene
+    from fullwell.schema.conversion.traffic import StreetView, Viewpoint
     from fullwell.schema.frame import CameraRig, FrameDescription, Quality, View
 
 __all__ = ["RecipeBuilder", "build_frame", "frame_document", "validate", "varied_document"]
@@ -131,12 +132,16 @@ class RecipeBuilder:
             confined = self._base_dir != self._document.base_dir
             self._files = RecipeFiles(self._base_dir, self._document.files, confined=confined)
         grid = WavelengthGrid(recipe.spectral.first_nm, recipe.spectral.last_nm, recipe.spectral.step_nm)
-        context = Context(grid, self._files)
+        context = Context(grid, self._files, self._assets, recipe, recipe.seed)
+        if recipe.scene.traffic is not None:
+            from fullwell.schema.conversion.traffic import street_view  # noqa: PLC0415
+
+            context.street = street_view(recipe.scene.traffic, context)
         cameras = tuple(
             camera_rig(camera, f"cameras[{i}]", recipe.quality.oversampling, context) for i, camera in enumerate(recipe.cameras)
         )
         plain = recipe.plain()
-        placed, of_scene = self._placed(recipe, plain, grid)
+        placed, of_scene = self._placed(recipe, plain, grid, context.street, cameras)
         _check_light_groups(recipe, placed)
         if self._views is None:
             self._views = self._shared_views(context)
@@ -160,7 +165,14 @@ class RecipeBuilder:
             views=_views_on(self._views, cameras, tuple(sorted(recipe.scene.light_groups.items()))),
         )
 
-    def _placed(self, recipe: RecipeDocument, plain: dict[str, Any], grid: WavelengthGrid) -> tuple[PlacedScene, Context]:
+    def _placed(
+        self,
+        recipe: RecipeDocument,
+        plain: dict[str, Any],
+        grid: WavelengthGrid,
+        street: StreetView | None,
+        cameras: tuple[CameraRig, ...],
+    ) -> tuple[PlacedScene, Context]:
         """Return the scene, the very object of the frame before where it is the same: what was loaded of it is used again."""
         from fullwell.schema.conversion.context import Context  # noqa: PLC0415
         from fullwell.schema.conversion.scenes import scene_of  # noqa: PLC0415
@@ -170,10 +182,13 @@ class RecipeBuilder:
         contents = {"scene": scene, "spectral": plain.get("spectral"), "files": plain.get("files")}
         if any(_asset_geometries(scene)):  # drawn by the seed, among the pins
             contents |= {"seed": recipe.seed, "assets": plain.get("assets")}
+        viewpoints = _viewpoints(cameras) if street is not None else ()
+        if street is not None:
+            contents |= {"seed": recipe.seed, "assets": plain.get("assets"), "views": [repr(view) for view in viewpoints]}
         key = canonical_json(contents)
         if self._last_scene is None or self._last_scene[0] != key:
-            context = Context(grid, self._files, self._assets, recipe, recipe.seed)
-            self._last_scene = (key, scene_of(recipe.scene, context), context)
+            context = Context(grid, self._files, self._assets, recipe, recipe.seed, street=street)
+            self._last_scene = (key, scene_of(recipe.scene, context, viewpoints), context)
         return self._last_scene[1:]
 
     def _shared_views(self, context: Context) -> list[tuple[tuple[Film, View], ...]]:
@@ -207,6 +222,16 @@ class RecipeBuilder:
         return list(found.values())
 
 
+def _viewpoints(cameras: tuple[CameraRig, ...]) -> tuple[Viewpoint, ...]:
+    """Return where cameras are and how finely they see: what levels of detail are chosen by."""
+    from fullwell.schema.conversion.traffic import Viewpoint  # noqa: PLC0415
+
+    return tuple(
+        Viewpoint(tuple(rig.camera.camera_to_world[:3, 3].tolist()), rig.camera.film.pitch_m / rig.camera.lens.focal_length_m)
+        for rig in cameras
+    )
+
+
 def _asset_geometries(scene: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield (path, geometry) of each asset in a scene of plain data."""
     for index, item in enumerate(scene["objects"]):
@@ -224,7 +249,8 @@ def _name_drawn(plain: dict[str, Any], drawn: dict[str, str]) -> None:
         kept = {name: geometry[name] for name in ("kind", "level", "lit") if name in geometry}
         geometry.clear()
         geometry.update(kept | {"id": drawn[path]})
-    plain["assets"] = {}
+    if plain["scene"].get("traffic") is None:  # a street draws among many, by rules: its pins stay
+        plain["assets"] = {}
 
 
 def _views_on(

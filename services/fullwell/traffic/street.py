@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +20,7 @@ from fullwell.core.rng import stream
 from fullwell.traffic.dressing import draw_paint, dress, street_style
 from fullwell.traffic.networks import NetworkSpec, make_network
 from fullwell.traffic.placement import AssetShelf, Footprints, PlacedAsset, footprint
-from fullwell.traffic.roads import RoadNetwork, read_network
+from fullwell.traffic.roads import Lane, RoadNetwork, read_network
 from fullwell.traffic.simulation import (
     Mover,
     TrafficDemand,
@@ -33,6 +33,8 @@ from fullwell.traffic.simulation import (
 )
 from fullwell.traffic.sumo import TrafficError
 from fullwell.traffic.surfaces import KERB_HEIGHT_M, GroundPlan, RoadSurface, ground_plan, road_surfaces
+
+Array = NDArray[np.float64]
 
 __all__ = ["TRAFFIC_CLASSES", "Street", "StreetMoment", "StreetSpec"]
 
@@ -65,6 +67,8 @@ class StreetSpec:
         An fcd-output file of the user's own SUMO run on the network, instead of a demand.
     times_s
         The moments of a clip, or one.
+    dressed, wet
+        Whether things stand along the roads; whether the roads are wet.
     lamps
         "day": running lights and what SUMO switches on; "night": headlights, tail lights, street lights and windows too.
     """
@@ -75,6 +79,8 @@ class StreetSpec:
     run_file: Path | None = None
     times_s: tuple[float, ...] = (60.0,)
     lamps: str = "day"
+    dressed: bool = True
+    wet: bool = False
     seed: int = 0
 
 
@@ -100,11 +106,14 @@ class Street:
     @cached_property
     def surfaces(self) -> tuple[RoadSurface, ...]:
         """Road, pavements, markings, ground."""
-        return tuple(road_surfaces(self.network, self.plan, self._style.surfaces))
+        style = replace(self._style.surfaces, road="asphalt/wet") if self.spec.wet else self._style.surfaces
+        return tuple(road_surfaces(self.network, self.plan, style))
 
     @cached_property
     def standing(self) -> tuple[PlacedAsset, ...]:
         """Everything that does not move, signals dark."""
+        if not self.spec.dressed:
+            return ()
         night = self.spec.lamps == "night"
         return dress(self.network, self.plan, self._style, self._shelf, seed=self.spec.seed, lights_on=night)
 
@@ -125,6 +134,58 @@ class Street:
                 weight = 0.05 if asset.asset_class == "emergency_vehicle" else 1.0
                 models.append(VehicleModel(asset.id, kind, length, width, height, weight))
         return models
+
+    def lane(self, name: str) -> Lane | None:
+        """Return a lane by its id; None where there is none, as for walkers off the lanes."""
+        return self._lanes.get(name)
+
+    @cached_property
+    def _lanes(self) -> dict[str, Lane]:
+        return {lane.id: lane for lane in self.network.lanes}
+
+    def ahead_of(self, item: PlacedAsset, distance_m: float, *, lane: int = 0) -> tuple[Array, Array] | None:
+        """Return the point (3,) on the road `distance_m` ahead of a mover's front bumper along its lane, and the direction.
+
+        `lane` counts lanes to the left. Where the lane ends, the way goes straight on through the junction into the lane that
+        bends least. None where the road ends, or has no such lane.
+        """
+        mover = item.mover
+        here = None if mover is None else self.lane(mover.lane)
+        if mover is None or here is None:
+            return None
+        left_m = distance_m
+        place_m = mover.position_m
+        visited: set[str] = set()
+        while left_m > here.length_m - place_m:
+            left_m -= here.length_m - place_m
+            visited.add(here.id)
+            following = self._straight_on(here, visited)
+            if following is None:
+                return None
+            left_m -= float(np.linalg.norm(following.centre_m[0] - here.centre_m[-1]))
+            here, place_m = following, 0.0
+            if left_m < 0:  # within a junction
+                return None
+        wanted = here.index + lane
+        lanes = (other for other in self._lanes.values() if other.edge_id == here.edge_id and other.index == wanted)
+        beside = next(lanes, None)
+        if beside is None:
+            return None
+        share = (place_m + left_m) / here.length_m
+        return beside.at(share * beside.length_m)
+
+    def _straight_on(self, lane: Lane, visited: set[str]) -> Lane | None:
+        edges = self.network.successors.get(lane.edge_id, ())
+        _, ahead = lane.at(lane.length_m)
+        best, most = None, math.cos(math.radians(50.0))
+        for other in self._lanes.values():
+            if other.edge_id in edges and other.kind == lane.kind and other.id not in visited:
+                _, direction = other.at(0.0)
+                aside = other.centre_m[0] - lane.centre_m[-1]
+                turn = float(direction[:2] @ ahead[:2]) - 0.01 * abs(float(aside[0] * ahead[1] - aside[1] * ahead[0]))
+                if turn > most:
+                    best, most = other, turn
+        return best
 
     def moment(self, number: int) -> StreetMoment:
         """Return the street at the time of that number in the spec."""

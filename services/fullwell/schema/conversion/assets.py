@@ -10,7 +10,7 @@ from fullwell.core.errors import unknown_name_message
 from fullwell.core.rng import stream
 from fullwell.radiometry import Spectrum, scale_to_luminance
 from fullwell.scene import Conductor, Dielectric, Diffuse, Emission, Material, Mirror, Principled, RoughPlastic, Texture
-from fullwell.schema.assets import AssetSource, no_candidate, pins_of, query_of, split_pin
+from fullwell.schema.assets import candidates_of, no_candidate, query_of, split_pin
 from fullwell.schema.conversion.context import Context, fail, located
 from fullwell.schema.conversion.spectra import colour_of
 
@@ -72,12 +72,9 @@ def draw_asset(geometry: AssetGeometry, object_id: str, path: str, context: Cont
 
 def _drawn(geometry: AssetGeometry, object_id: str, path: str, context: Context) -> tuple[str, str]:
     query = query_of(geometry, path)
-    pins = pins_of(context.document, query, path) if context.document is not None else None
-    if pins is None:
-        if not isinstance(context.assets, AssetSource):
-            fail(path, "draws an asset, but the recipe holds no pins and no catalogue is at hand here. Submit it to a service.")
-        with located(path):
-            pins = tuple(context.assets.candidates(query))
+    assert context.assets is not None
+    with located(path):
+        pins = candidates_of(context.document, context.assets, query, path)
     if not pins:
         fail(path, no_candidate(path, query).removeprefix(f"{path} "))
     given = geometry.weights

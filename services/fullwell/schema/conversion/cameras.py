@@ -19,6 +19,7 @@ from fullwell.schema.conversion.context import Context, fail, located
 from fullwell.schema.conversion.optics import optics_options
 from fullwell.schema.conversion.sensors import exposure_of, sensor_model
 from fullwell.schema.conversion.spectra import reflectance_of, spd_of
+from fullwell.schema.conversion.traffic import mount_pose
 from fullwell.schema.errors import RecipeError
 from fullwell.schema.frame import CameraRig, SensorRig
 from fullwell.schema.v1.cameras import (
@@ -42,7 +43,7 @@ _RIGID_TOLERANCE = 1e-6
 
 def camera_rig(document: CameraDocument, path: str, oversampling: int, context: Context) -> CameraRig:
     """Return the camera and the sensors behind its lens; raises RecipeError where they are too large to render."""
-    pose = _pose(document.pose, f"{path}.pose")
+    pose = _pose(document.pose, f"{path}.pose", context)
     models = [sensor_model(sensor, f"{path}.sensors[{i}]", context) for i, sensor in enumerate(document.sensors)]
     film = _film(models, path, oversampling, context)
     lens = _lens(document, f"{path}.lens", models[0], context)
@@ -62,7 +63,9 @@ def camera_rig(document: CameraDocument, path: str, oversampling: int, context: 
     return CameraRig(Camera(document.name, pose, lens, film), tuple(sensors), options, document.model, depth_layers=layers)
 
 
-def _pose(document: PoseDocument, path: str) -> NDArray[np.float64]:
+def _pose(document: PoseDocument, path: str, context: Context) -> NDArray[np.float64]:
+    if document.mount is not None:
+        return mount_pose(document.mount, context.street, f"{path}.mount")
     if document.matrix is not None:
         return _rigid(np.array(document.matrix, dtype=np.float64), f"{path}.matrix")
     up = document.up or (0.0, 0.0, 1.0)

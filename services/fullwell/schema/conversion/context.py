@@ -20,6 +20,7 @@ from fullwell.schema.errors import RecipeError
 if TYPE_CHECKING:
     from fullwell.assets.model import LoadedModel
     from fullwell.schema.assets import StoredAssetFiles
+    from fullwell.schema.conversion.traffic import StreetView
     from fullwell.schema.v1.recipe import RecipeDocument
 
 __all__ = ["Context", "RecipeFiles", "fail", "located"]
@@ -169,6 +170,7 @@ class Context:
     document: RecipeDocument | None = None
     seed: int = 0
     drawn_assets: dict[str, str] = field(default_factory=dict)
+    street: StreetView | None = None
     warnings: list[str] = field(default_factory=list)
     used_files: dict[str, str] = field(default_factory=dict)
     materials: dict[str, tuple[Material, Emission | None]] = field(default_factory=dict)

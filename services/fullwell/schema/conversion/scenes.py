@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
@@ -30,6 +30,7 @@ from fullwell.schema.conversion.context import Context, fail
 from fullwell.schema.conversion.geometry import geometry_of, transform_of
 from fullwell.schema.conversion.lights import area_light_object, light_of
 from fullwell.schema.conversion.materials import material_of, model_material
+from fullwell.schema.conversion.traffic import Viewpoint, street_objects
 from fullwell.schema.v1.geometry import AssetGeometry, ModelGeometry
 from fullwell.schema.v1.lights import AreaLight
 from fullwell.schema.v1.recipe import FogDocument, ObjectDocument, PartDocument, SceneDocument
@@ -51,7 +52,7 @@ class PlacedScene:
     inside_ok: tuple[bool, ...]
 
 
-def scene_of(document: SceneDocument, context: Context) -> PlacedScene:
+def scene_of(document: SceneDocument, context: Context, viewpoints: Sequence[Viewpoint] = ()) -> PlacedScene:
     """Return the scene; raises RecipeError for the first thing in it that cannot be rendered."""
     _check_not_empty(document)
     objects, paths, inside_ok = [], [], []
@@ -60,6 +61,11 @@ def scene_of(document: SceneDocument, context: Context) -> PlacedScene:
         objects.append(_object(item, document.materials, path, context))
         paths.append(path)
         inside_ok.append(item.inside_ok)
+    if document.traffic is not None and context.street is not None:
+        for of_street in street_objects(document.traffic, context.street, viewpoints, context):
+            objects.append(of_street)
+            paths.append("scene.traffic")
+            inside_ok.append(True)
     lights: list[Light] = []
     environment = ""
     for index, light in enumerate(document.lights):
@@ -99,7 +105,7 @@ def _fog(document: FogDocument | None) -> Fog | None:
 
 def _check_not_empty(document: SceneDocument) -> None:
     environments = ("constant_environment", "image_environment", "sun_sky", "area")
-    if not document.objects and not any(light.kind in environments for light in document.lights):
+    if not document.objects and document.traffic is None and not any(light.kind in environments for light in document.lights):
         fail("scene.objects", "is empty and there is no environment light: nothing can be seen. Add an object or a sky.")
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from fullwell.schema.v1.common import (
     Direction,
@@ -42,6 +42,7 @@ __all__ = [
     "ExposureDocument",
     "IspDocument",
     "LensDocument",
+    "MountDocument",
     "PoseDocument",
     "SensorDocument",
     "ToneDocument",
@@ -51,8 +52,29 @@ MAX_SIDE_PX = 20_000
 _Side = Annotated[int, Range(ge=1, le=MAX_SIDE_PX, whole=True)]
 
 
+def _place_form(value: Any) -> str:
+    return "point" if isinstance(value, list | tuple) else "place"
+
+
+class MountDocument(Document):
+    """A camera on the ego vehicle of a traffic scene.
+
+    `at` is a place on it, or [x, y, z] in metres forward and to the left of the middle of its bounding box, above the ground.
+    `yaw_deg` turns to the left, `pitch_deg` upwards, `roll_deg` to the right, from straight ahead (from backwards at the rear).
+    """
+
+    at: Annotated[
+        Annotated[Literal["windscreen", "bumper", "roof", "mirror_left", "mirror_right", "rear", "driver"], Tag("place")]
+        | Annotated[Point, Tag("point")],
+        Discriminator(_place_form),
+    ] = "windscreen"
+    yaw_deg: Number = 0.0
+    pitch_deg: Annotated[float, Range(ge=-90, le=90)] = 0.0
+    roll_deg: Number = 0.0
+
+
 class PoseDocument(Document):
-    """Where the camera is: `origin_m`, `target_m` and `up`, or `matrix`.
+    """Where the camera is: `origin_m`, `target_m` and `up`, or `matrix`, or `mount` on a traffic scene's ego.
 
     `matrix` is the 4 x 4 rigid camera-to-world transform, camera axes x right, y down, z forward.
     """
@@ -61,9 +83,14 @@ class PoseDocument(Document):
     target_m: Point | None = None
     up: Direction | None = None
     matrix: MatrixRows | None = None
+    mount: MountDocument | None = None
 
     @model_validator(mode="after")
     def _one_way(self) -> PoseDocument:
+        if self.mount is not None:
+            if (self.origin_m, self.target_m, self.up, self.matrix) != (None, None, None, None):
+                refuse("gives the pose twice; give mount alone, or no mount.")
+            return self
         points = [self.origin_m, self.target_m]
         ways = "give origin_m and target_m (and up), or matrix."
         if self.matrix is not None and (points != [None, None] or self.up is not None):

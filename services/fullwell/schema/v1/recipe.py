@@ -27,6 +27,7 @@ from fullwell.schema.v1.common import (
 from fullwell.schema.v1.geometry import GeometryDocument, Transform
 from fullwell.schema.v1.lights import LightDocument
 from fullwell.schema.v1.materials import MaterialDocument, MaterialReference
+from fullwell.schema.v1.traffic import TrafficDocument
 from fullwell.schema.v1.vary import VaryDocument
 
 __all__ = [
@@ -167,6 +168,7 @@ class SceneDocument(Document):
     lights: list[LightDocument] = Field(default_factory=list, max_length=10_000)
     light_groups: dict[Group, NonNegative] = Field(default_factory=dict)
     atmosphere: FogDocument | None = None
+    traffic: TrafficDocument | None = None
     classes: list[Class] | None = None
 
     @model_validator(mode="after")

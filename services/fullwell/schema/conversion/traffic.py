@@ -1,0 +1,353 @@
+"""Traffic scenes of a recipe: streets made and kept, the ego chosen, mounts and targets placed, assets turned into objects."""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fullwell.core.errors import FieldError, unknown_name_message
+from fullwell.core.hashing import digest_of
+from fullwell.scene import Emission, Material, Mesh, Part, SceneObject, look_at
+from fullwell.schema.assets import candidates_of, traffic_queries
+from fullwell.schema.conversion.assets import DrawnAsset, asset_part_material, catalogue_material
+from fullwell.schema.conversion.context import Context, fail, located
+from fullwell.schema.v1.cameras import MountDocument
+from fullwell.schema.v1.traffic import EgoDocument, TargetDocument, TrafficDocument
+
+if TYPE_CHECKING:
+    from fullwell.traffic.placement import AssetShelf, PlacedAsset
+    from fullwell.traffic.street import Street, StreetMoment, StreetSpec
+
+__all__ = ["StreetView", "Viewpoint", "mount_pose", "street_objects", "street_view"]
+
+Array = NDArray[np.float64]
+
+_KEPT_STREETS: Final = 4
+_STANDARD_EYE: Final = (0.05, 0.2, 0.82)
+"""Driver's eyes as shares of length, width and height, where an asset does not say."""
+_LEVEL_ERROR_PX: Final = 0.7
+"""A coarser level of detail is taken where it is nowhere farther from the finest than this share of a pixel."""
+
+_streets: OrderedDict[str, Street] = OrderedDict()
+
+
+@dataclass(frozen=True, slots=True)
+class Viewpoint:
+    """Where a camera is (3,) [m], and the angle [rad] that its finest pixel sees."""
+
+    origin_m: tuple[float, float, float]
+    pixel_rad: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StreetView:
+    """A street at a moment, as a recipe looks at it."""
+
+    street: Street
+    moment: StreetMoment
+    ego: PlacedAsset | None
+    targets: tuple[PlacedAsset, ...]
+    notes: tuple[str, ...]
+
+
+# The street ----------------------------------------------------------------------------------------------------------
+
+
+def street_view(document: TrafficDocument, context: Context) -> StreetView:
+    """Return the street of a recipe with its ego and targets; streets are kept, so that a clip makes one for all frames.
+
+    Raises RecipeError for roads that cannot be read, traffic without assets, an ego that is nowhere, targets off the road.
+    """
+    from fullwell.traffic.street import Street  # noqa: PLC0415 - SUMO is an extra
+
+    path = "scene.traffic"
+    shelf, digests = _shelf(document, context)
+    spec = _spec(document, context)
+    key = digest_of([_spec_key(spec, context), digests])
+    with located(path):
+        if key not in _streets:
+            while len(_streets) >= _KEPT_STREETS:
+                _streets.popitem(last=False)
+            _streets[key] = Street(spec, shelf, path=path)
+        _streets.move_to_end(key)
+        street = _streets[key]
+        moment = street.moment(0)
+        ego = None if document.ego is None else _ego(document.ego, moment, street)
+        wanted = enumerate(document.targets)
+        targets = tuple(_target(target, f"{path}.targets[{number}]", ego, street, shelf) for number, target in wanted)
+    moment, notes = _without(moment, targets)
+    return StreetView(street, moment, ego, targets, notes)
+
+
+def _shelf(document: TrafficDocument, context: Context) -> tuple[AssetShelf, list[str]]:
+    """Return the assets to draw from, and their digests: those that the recipe is pinned to, or that the store has now."""
+    from fullwell.traffic.placement import AssetShelf  # noqa: PLC0415
+
+    path = "scene.traffic"
+    if context.assets is None:
+        fail(path, "needs assets, but no asset store is at hand here. Run it where one is.")
+    by_class: dict[str, list[Any]] = {}
+    digests: list[str] = []
+    for query in traffic_queries(document):
+        pins = candidates_of(context.document, context.assets, query, path)
+        with located(path):
+            by_class[query.asset_class] = [context.assets.manifest(digest) for _, digest in pins]
+        digests += [digest for _, digest in pins]
+    return AssetShelf(by_class), digests
+
+
+def _spec(document: TrafficDocument, context: Context) -> StreetSpec:
+    from fullwell.traffic.networks import NetworkSpec  # noqa: PLC0415
+    from fullwell.traffic.simulation import TrafficDemand  # noqa: PLC0415
+    from fullwell.traffic.street import StreetSpec  # noqa: PLC0415
+    from fullwell.traffic.templates import CrossSection  # noqa: PLC0415
+
+    roads, path = document.network, "scene.traffic"
+    files: dict[str, Path | None] = {}
+    for name, reference in (("network", roads.file), ("run", document.run.file if document.run else None)):
+        files[name] = None
+        if reference is not None:
+            file, context.used_files[reference] = context.files.find(reference, f"{path}.{name}.file")
+            files[name] = file
+    section = CrossSection(
+        lanes=roads.lanes,
+        lane_width_m=roads.lane_width_m,
+        sidewalk_width_m=roads.sidewalk_width_m,
+        parking_width_m=roads.parking_width_m,
+        bike_lane_width_m=roads.bike_lane_width_m,
+        bus_lane_width_m=roads.bus_lane_width_m,
+        speed_m_s=roads.speed_limit_m_s,
+    )
+    network = NetworkSpec(
+        layout=roads.layout or "",
+        file=files["network"],
+        section=section,
+        length_m=roads.length_m,
+        size=roads.size,
+        signals=roads.signals,
+        seed=roads.seed,
+    )
+    demand = TrafficDemand(
+        {kind: entry.rate_per_s for kind, entry in sorted(document.demand.items()) if entry.rate_per_s > 0},
+        {kind: entry.density_per_km for kind, entry in sorted(document.demand.items()) if entry.density_per_km > 0},
+    )
+    return StreetSpec(
+        network=network,
+        demand=demand,
+        style=document.style,
+        run_file=files["run"],
+        times_s=(document.time_s,),
+        lamps=document.lamps,
+        dressed=document.dressed,
+        wet=document.wet,
+        seed=context.seed,
+    )
+
+
+def _spec_key(spec: StreetSpec, context: Context) -> list[Any]:
+    """Return what decides a street: files by their content."""
+    used = sorted(context.used_files.items()) if spec.network.file is not None or spec.run_file is not None else []
+    plain = replace(spec, network=replace(spec.network, file=None), run_file=None)
+    return [repr(plain), [digest for _, digest in used], spec.network.file is not None, spec.run_file is not None]
+
+
+# Ego, mounts, targets ------------------------------------------------------------------------------------------------
+
+
+def _ego(document: EgoDocument, moment: StreetMoment, street: Street) -> PlacedAsset:
+    path = "scene.traffic.ego"
+    movers = [item for item in moment.assets if item.mover is not None]
+    if document.id is not None:
+        found = next((item for item in movers if item.id == document.id), None)
+        if found is None:
+            known = unknown_name_message("vehicle", document.id, [item.id for item in movers])
+            fail(f"{path}.id", f"is not in the network at {moment.time_s:g} s: {known}", document.id)
+        return found
+    kinds = [item for item in movers if item.mover is not None and item.mover.kind == document.kind]
+    fitting = [item for item in kinds if _fits(item, document, movers, street)]
+    if not fitting:
+        fail(
+            path,
+            f"fits none of the {len(kinds)} vehicles of kind {document.kind!r} in the network at {moment.time_s:g} s. Relax "
+            "its conditions, raise the demand, or choose another time.",
+        )
+    return min(fitting, key=lambda item: item.id)
+
+
+def _fits(item: PlacedAsset, document: EgoDocument, movers: Sequence[PlacedAsset], street: Street) -> bool:
+    assert item.mover is not None
+    speed = item.mover.speed_m_s
+    if speed < document.min_speed_m_s or (document.max_speed_m_s is not None and speed > document.max_speed_m_s):
+        return False
+    lane = street.lane(item.mover.lane)
+    if lane is None or lane.length_m - item.mover.position_m < document.min_road_ahead_m:
+        return document.min_road_ahead_m <= 0 and document.vehicle_ahead_m is None
+    if document.vehicle_ahead_m is None:
+        return True
+    ahead = (
+        other.mover.position_m - other.asset.size_m[0] - item.mover.position_m
+        for other in movers
+        if other.mover is not None and other.mover.lane == item.mover.lane and other.mover.position_m > item.mover.position_m
+    )
+    return any(0 <= gap <= document.vehicle_ahead_m for gap in ahead)
+
+
+def mount_pose(document: MountDocument, view: StreetView | None, path: str) -> Array:
+    """Return the (4, 4) camera-to-world pose of a camera on the ego. Raises RecipeError where the scene has none."""
+    if view is None or view.ego is None:
+        fail(path, "needs scene.traffic with an ego; add them, or give origin_m and target_m.")
+    ego = view.ego
+    place = _place_m(document, ego)
+    backwards = 180.0 if document.at == "rear" else 0.0
+    yaw, pitch, roll = (math.radians(angle) for angle in (document.yaw_deg + backwards, document.pitch_deg, document.roll_deg))
+    forward = np.array([math.cos(pitch) * math.cos(yaw), math.cos(pitch) * math.sin(yaw), math.sin(pitch)])
+    left = np.array([-math.sin(yaw), math.cos(yaw), 0.0])
+    up = np.cross(forward, left)
+    up = math.cos(roll) * up - math.sin(roll) * left
+    to_world = ego.to_world()
+    origin = (to_world @ np.append(place, 1.0))[:3]
+    try:
+        return look_at(origin, origin + to_world[:3, :3] @ forward, to_world[:3, :3] @ up)
+    except FieldError as error:
+        fail(path, f"points nowhere: {error.message}")
+
+
+def _place_m(document: MountDocument, ego: PlacedAsset) -> Array:
+    length, width, height = ego.asset.size_m
+    if not isinstance(document.at, str):
+        return np.array(document.at, dtype=np.float64)
+    said = ego.asset.attributes
+    eye = [
+        float(said[f"driver_eye_{axis}_m"]) if f"driver_eye_{axis}_m" in said else share * side
+        for axis, share, side in zip("xyz", _STANDARD_EYE, (length, width, height), strict=True)
+    ]
+    return np.array(
+        {
+            "windscreen": [eye[0] + 0.55, 0.0, min(eye[2] + 0.12, 0.93 * height)],
+            "driver": eye,
+            "bumper": [length / 2 + 0.03, 0.0, min(0.6, 0.4 * height)],
+            "roof": [0.0, 0.0, height + 0.12],
+            "mirror_left": [0.17 * length, width / 2 + 0.05, 0.7 * height],
+            "mirror_right": [0.17 * length, -width / 2 - 0.05, 0.7 * height],
+            "rear": [-length / 2 - 0.03, 0.0, 0.72 * height],
+        }[document.at]
+    )
+
+
+def _target(document: TargetDocument, path: str, ego: PlacedAsset | None, street: Street, shelf: AssetShelf) -> PlacedAsset:
+    from fullwell.core.rng import stream  # noqa: PLC0415
+    from fullwell.traffic.placement import PlacedAsset  # noqa: PLC0415
+
+    assert ego is not None
+    choices = [
+        asset
+        for asset in shelf.all(document.asset_class)
+        if set(document.tags) <= set(asset.tags) and document.asset in (None, asset.id)
+    ]
+    if not choices:
+        fail(path, f"finds no asset of class {document.asset_class!r} with its tags among those that the scene may draw.")
+    asset = choices[int(stream(street.spec.seed, "target", document.id).integers(len(choices)))]
+    place = street.ahead_of(ego, document.distance_m, lane=document.lane)
+    if place is None:
+        fail(
+            f"{path}.distance_m",
+            f"is {document.distance_m:g} m; the road ahead of the ego ends before, or has no lane {document.lane:+d} there. "
+            "Choose another ego (min_road_ahead_m) or a longer road.",
+            document.distance_m,
+        )
+    point, direction = place
+    left = np.array([-direction[1], direction[0], 0.0])
+    yaw = math.atan2(direction[1], direction[0]) + math.radians(document.facing_deg)
+    # The nearest point of the target is at the distance, whichever way it faces.
+    turn = math.radians(document.facing_deg)
+    half = abs(asset.size_m[0] / 2 * math.cos(turn)) + abs(asset.size_m[1] / 2 * math.sin(turn))
+    centre = point + half * direction + document.lateral_m * left
+    return PlacedAsset(document.id, asset, "mover", centre, yaw)
+
+
+def _without(moment: StreetMoment, targets: Sequence[PlacedAsset]) -> tuple[StreetMoment, tuple[str, ...]]:
+    if not targets:
+        return moment, moment.notes
+    outlines = [target.outline(0.3) for target in targets]
+    kept = tuple(
+        item
+        for item in moment.assets
+        if item.role in ("building", "light", "signal") or not any(outline.intersects(item.outline()) for outline in outlines)
+    )
+    dropped = len(moment.assets) - len(kept)
+    notes = (*moment.notes, f"{dropped} objects were left out where targets stand.") if dropped else moment.notes
+    return replace(moment, assets=kept), notes
+
+
+# Objects -------------------------------------------------------------------------------------------------------------
+
+
+def street_objects(
+    document: TrafficDocument, view: StreetView, viewpoints: Sequence[Viewpoint], context: Context
+) -> Iterator[SceneObject]:
+    """Yield the ground, then everything within range of a camera; each asset at the coarsest level that looks the same."""
+    for surface in view.street.surfaces:
+        material, _ = catalogue_material(surface.material, "scene.traffic", context)
+        mesh = Mesh(surface.vertices_m, surface.faces.astype(np.uint32))
+        name = f"street/{surface.name}/{surface.material.replace('/', '-')}"
+        yield SceneObject(name, surface.name, (Part(mesh, material),), np.eye(4))
+    shown = [item for item in (*view.moment.assets, *view.targets) if item is not view.ego or _is_shown(document)]
+    far = 0
+    parts: dict[Any, tuple[Part, ...]] = {}
+    drawn: dict[tuple[str, int], DrawnAsset] = {}
+    for item in shown:
+        radius_m = float(np.linalg.norm(item.asset.size_m)) / 2
+        distances = [max(float(np.linalg.norm(item.position_m - np.array(v.origin_m))) - radius_m, 0.05) for v in viewpoints]
+        if min(distances) > document.range_m:
+            far += 1
+            continue
+        level = _level(item, distances, viewpoints)
+        if (item.asset.digest, level) not in drawn:
+            drawn[item.asset.digest, level] = _drawn(item, level, context)
+        asset = drawn[item.asset.digest, level]
+        key = (item.asset.digest, level, item.lit, item.paint)
+        if key not in parts:
+            parts[key] = tuple(_parts(asset, item, context))
+        yield SceneObject(item.id, item.asset.asset_class, parts[key], item.to_world(), (asset.licence,))
+    for note in view.notes:
+        context.warn(f"scene.traffic: {note}")
+    if far:
+        context.warn(f"scene.traffic: {far} objects beyond range_m = {document.range_m:g} m from every camera are left out.")
+
+
+def _is_shown(document: TrafficDocument) -> bool:
+    return document.ego is None or document.ego.show
+
+
+def _level(item: PlacedAsset, distances_m: Sequence[float], viewpoints: Sequence[Viewpoint]) -> int:
+    """Return the coarsest level whose error is too small to be seen from any camera."""
+    seen = zip(distances_m, viewpoints, strict=True)
+    allowed_m = min(_LEVEL_ERROR_PX * view.pixel_rad * distance for distance, view in seen)
+    fitting = [number for number, level in enumerate(item.asset.levels) if level.error_m <= allowed_m]
+    return max(fitting, default=0)
+
+
+def _drawn(item: PlacedAsset, level: int, context: Context) -> DrawnAsset:
+    assert context.assets is not None
+    with located("scene.traffic"):
+        file = context.assets.level_file(item.asset, level)
+        return DrawnAsset(item.asset, context.files.level(file, item.asset.levels[level].sha256, path="scene.traffic"))
+
+
+def _parts(asset: DrawnAsset, item: PlacedAsset, context: Context) -> Iterator[Part]:
+    paintable = {part.name for part in asset.manifest.parts if part.paintable}
+    for loaded in asset.model.parts:
+        material: Material
+        emission: Emission | None
+        if item.paint and loaded.name in paintable:
+            material, emission = catalogue_material(item.paint, "scene.traffic", context)
+        else:
+            material, emission = asset_part_material(asset, loaded, item.lit, f"scene.traffic ({item.asset.id})", context)
+        yield Part(Mesh(loaded.vertices_m, loaded.faces, loaded.normals, loaded.uv), material, np.eye(4), emission, loaded.name)
