@@ -15,6 +15,7 @@ from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 
 from fullwell.core import (
+    AssetError,
     CancelledError,
     ConflictError,
     FieldError,
@@ -61,6 +62,7 @@ PROBLEM_RESPONSES = _described(401, 403, 404, 409, 413, 422, 500, 503)
 
 _STATUS_OF: tuple[tuple[type[FullwellError], int], ...] = (
     (FieldError, 422),
+    (AssetError, 422),
     (NotFoundError, 404),
     (ConflictError, 409),
     (CancelledError, 409),
