@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -145,11 +145,13 @@ class Turntable(Element, component=FILES / "turntable.js"):
 
 
 class ModelViewer(Element, component=FILES / "model_viewer.js"):
-    """A GLB file to turn; `size_m` are the asset's extents (x forward, y left, z up) [m]."""
+    """A GLB file to turn; `size_m` are the asset's extents (x forward, y left, z up) [m], `paints` colours [CSS] of parts."""
 
-    def __init__(self, source: str, *, label: str, size_m: Sequence[float], on_part: Handler) -> None:
+    def __init__(
+        self, source: str, *, label: str, size_m: Sequence[float], paints: Mapping[str, str], on_part: Handler
+    ) -> None:
         super().__init__()
-        self._props.update(source=source, label=label, size=list(size_m), picked="")
+        self._props.update(source=source, label=label, size=list(size_m), paints=dict(paints), picked="")
         self.on("part", lambda event: on_part(event.args))
 
     def show(self, source: str) -> None:

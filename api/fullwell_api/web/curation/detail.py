@@ -14,6 +14,7 @@ from fullwell.assets.records import AssetManifest, Check, PartRecord
 from fullwell.core import FullwellError
 from fullwell.jobs.asset_library import AssetLibrary
 from fullwell.jobs.asset_records import AssetEntry, AssetEvent
+from fullwell_api.routes.assets import queue_previews
 from fullwell_api.web.curation import dialogs
 from fullwell_api.web.curation.addresses import View
 from fullwell_api.web.curation.comparing import differences
@@ -185,11 +186,11 @@ class DetailView:
                 self._old_version_note(entry)
                 self._pictures(entry)
                 self._materials(entry)
+                self._levels(entry)
             with ui.element("div"):
                 self._checks(entry)
                 self._size(entry.manifest)
                 self._about(entry)
-                self._levels(entry)
                 self._versions(entry)
                 self._history()
 
@@ -218,10 +219,13 @@ class DetailView:
 
     def _model(self, entry: AssetEntry, level_box: Element) -> None:
         manifest = entry.manifest
+        # The file holds the colours that it came with; what a curator has chosen since is painted over them.
+        paints = {part.name: swatch(part.material) for part in manifest.parts if part.material.origin == "curator"}
         self._viewer = ModelViewer(
             _model_address(entry, 0),
             label=manifest.title,
             size_m=manifest.size_m,
+            paints=paints,
             on_part=lambda names: self._picked(names, entry),
         )
         self._viewer.pick(self._lit)
@@ -314,7 +318,7 @@ class DetailView:
             self._rows: dict[str, Element] = {}
             with ui.element("div").classes("fw-scroll"), ui.element("table").classes("fw-table"):
                 with ui.element("thead"), ui.element("tr"):
-                    for text, classes in (("Part", ""), ("Material", ""), ("Triangles", "r"), ("Area", "r")):
+                    for text, classes in (("Part", ""), ("Material", ""), ("Triangles", "r"), ("Area", "r fw-only-wide")):
                         tag("th", text, classes).props('scope="col"')
                 with ui.element("tbody"):
                     for part in parts:
@@ -334,7 +338,7 @@ class DetailView:
                 if is_made_up(part.material):
                     tag("div", "spectrum made up from sRGB", "fw-flag")
             tag("td", f"{part.triangles:,}", "r")
-            tag("td", f"{part.area_m2:.3g} m²", "r")
+            tag("td", f"{part.area_m2:.3g} m²", "r fw-only-wide")
         row.on("click", lambda _: self._choose_part(part.name, entry), [])
         self._rows[part.name] = row
 
@@ -382,7 +386,14 @@ class DetailView:
         )
         if entries is not None:
             ui.notify(f"Version {entries[0].version}: {part.name} is {chosen}", type="info")
+            await page.attempt(self._new_pictures, entries[0], newest.manifest.look_digest)
             await page.decisions.after(entries)
+
+    def _new_pictures(self, entry: AssetEntry, old_look: str) -> None:
+        """Have a look's previews rendered where it is another than before, and has none yet."""
+        page, look = self._page, entry.manifest.look_digest
+        if look != old_look and not page.library.preview_names(look):
+            queue_previews(page.curation.services, entry, entry.created_by)
 
     # -- facts --------------------------------------------------------------------------------------------------------
 
@@ -394,14 +405,14 @@ class DetailView:
                 tag("span", _summary(checks), "fw-soft fw-small")
             if entry.manifest.needs_decision and entry.state == "pending":
                 note("A person must decide: approving needs a reason.", symbol="o_priority_high").style("margin-bottom: 8px")
-            with ui.element("ul").classes("fw-checks"):
-                for check in checks:
-                    with ui.element("li").classes(check.state):
-                        icon(CHECK_ICONS[check.state])
-                        with ui.element("div"):
-                            tag("span", check.name.replace("_", " "), "name")
-                            tag("span", f" · {check.state}", "fw-soft")
-                            tag("div", check.message)
+            fine = [check for check in checks if check.state == "ok"]
+            _check_list([check for check in checks if check.state != "ok"])
+            if fine:
+                with ui.element("details").classes("fw-fine"):
+                    with ui.element("summary"):
+                        icon(CHECK_ICONS["ok"])
+                        tag("span", f"{len(fine)} {'check is' if len(fine) == 1 else 'checks are'} fine")
+                    _check_list(fine)
 
     def _size(self, manifest: AssetManifest) -> None:
         kind = asset_class(manifest.asset_class)
@@ -550,6 +561,17 @@ class DetailView:
                         tag("td", line.field)
                         tag("td", line.first)
                         tag("td", line.second)
+
+
+def _check_list(checks: Sequence[Check]) -> None:
+    with ui.element("ul").classes("fw-checks"):
+        for check in checks:
+            with ui.element("li").classes(check.state):
+                icon(CHECK_ICONS[check.state])
+                with ui.element("div"):
+                    tag("span", check.name.replace("_", " "), "name")
+                    tag("span", f" · {check.state}", "fw-soft")
+                    tag("div", check.message)
 
 
 def _summary(checks: Sequence[Check]) -> str:

@@ -116,7 +116,7 @@ def chart_options(curves: list[Curve]) -> dict[str, Any]:
             "min": SHORTEST_NM,
             "max": LONGEST_NM,
             "axisTick": {"customValues": NAMED_NM},
-            "axisLabel": {"color": soft, "customValues": NAMED_NM},
+            "axisLabel": {"color": soft, "customValues": NAMED_NM, "formatter": "{value}"},
             "name": "wavelength, nm",
             "nameLocation": "middle",
             "nameGap": 26,

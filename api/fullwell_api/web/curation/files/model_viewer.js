@@ -50,7 +50,7 @@ export default {
           <q-icon name="o_center_focus_strong" size="18px" aria-hidden="true"></q-icon><span>Reset</span></button>
       </div>
     </div>`,
-  props: { source: String, label: String, size: Array, picked: String },
+  props: { source: String, label: String, size: Array, paints: Object, picked: String },
   emits: ["part"],
   data() {
     return { note: "Loading the model…", failed: false, scale: true, wire: false };
@@ -164,6 +164,10 @@ export default {
         mesh.castShadow = mesh.receiveShadow = true;
         mesh.material = mesh.material.clone();
         mesh.material.wireframe = this.wire;
+        const paint = this.namesOf(mesh).find((name) => name in (this.paints ?? {}));
+        if (!paint) return;
+        mesh.material.map = null;
+        mesh.material.color.set(this.paints[paint]);
       });
       this.scene.add(model);
       this.box = new THREE.Box3().setFromObject(model);
