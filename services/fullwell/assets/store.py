@@ -10,18 +10,22 @@ Objects::
 
 from __future__ import annotations
 
+import json
 import re
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Final
 
 from fullwell.assets.cache import BlobCache, blob_key, check_digest
 from fullwell.assets.records import AssetManifest, check_asset_id
 from fullwell.core.errors import FieldError
+from fullwell.core.hashing import digest_of, sha256_hex
 from fullwell.storage.protocol import ObjectStore
 
 __all__ = [
     "PREVIEW_PREFIX",
     "StoredAssets",
+    "StoredManifest",
     "blob_key",
     "check_digest",
     "event_key",
@@ -68,6 +72,26 @@ def preview_names(store: ObjectStore, look_digest: str) -> tuple[str, ...]:
 def put_preview(store: ObjectStore, look_digest: str, name: str, png: bytes, *, if_absent: bool = False) -> None:
     """Store a picture of a look; one of the same name is replaced, or with `if_absent` raises ConflictError."""
     store.put(preview_key(look_digest, name), png, "image/png", if_absent=if_absent)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StoredManifest:
+    """A manifest with its bytes and digests, each made once: making a document of a manifest takes milliseconds."""
+
+    manifest: AssetManifest
+    content: bytes
+    digest: str
+    look_digest: str
+
+    @classmethod
+    def from_content(cls, content: bytes) -> StoredManifest:
+        """Return the manifest of canonical JSON. Raises FieldError where it is none, ValueError where it is no JSON."""
+        document = json.loads(content)
+        if not isinstance(document, dict):
+            raise FieldError("the asset manifest is damaged: it is no object.", path="manifest")
+        manifest = AssetManifest.from_document(document)
+        look_digest = digest_of({"levels": document["levels"], "parts": document["parts"]})
+        return cls(manifest, content, sha256_hex(content), look_digest)
 
 
 class StoredAssets:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 import threading
-from collections import OrderedDict
-from collections.abc import Iterable, Sequence
+from collections import Counter, OrderedDict
+from collections.abc import Sequence
 from typing import Any, Final, cast
 
-from sqlalchemy import ColumnElement, Select, func, select
+from sqlalchemy import Select, func, select
 from sqlalchemy.orm import Session, aliased
 
 from fullwell.assets.query import AssetQuery, ReviewState
@@ -16,7 +16,7 @@ from fullwell.assets.records import AssetManifest
 from fullwell.core import FieldError, NotFoundError, unknown_name_message
 from fullwell.jobs.asset_index import files_of, pieces
 from fullwell.jobs.asset_records import AssetEntry, AssetEvent, AssetOrder, AssetPage
-from fullwell.jobs.asset_rows import AssetEventRow, AssetManifestRow, AssetTagRow, AssetVersionRow
+from fullwell.jobs.asset_rows import AssetEventRow, AssetManifestRow, AssetVersionRow
 from fullwell.jobs.asset_search import after_cursor, conditions, cursor_at, order_by
 from fullwell.jobs.database import Database
 
@@ -99,14 +99,16 @@ class AssetCatalogue:
             raise FieldError(f"limit is {limit}; must be 1 to {MAX_PAGE}.", path="limit", value=limit)
         matching = [AssetVersionRow.shown.is_(True), *conditions(query)]
         ordering = order_by(order)
-        page = _entries_query().where(*matching).order_by(*ordering).limit(limit + 1)
+        page = select(AssetVersionRow.key).where(*matching).order_by(*ordering).limit(limit + 1)
         if cursor:
             page = page.where(after_cursor(order, cursor))
         with self._database.reading() as session:
             total = session.scalar(select(func.count()).select_from(AssetVersionRow).where(*matching)) or 0
-            found = _found(session, page)
-        shown = found[:limit]
-        further = cursor_at(order, shown[-1][0]) if len(found) > limit else ""
+            # Keys first: sorting whole rows with their documents would take longer than all the rest.
+            keys = session.scalars(page).all()
+            rows = {found[0].key: found for found in _found(session, _entries_query().where(AssetVersionRow.key.in_(keys)))}
+        shown = [rows[key] for key in keys[:limit] if key in rows]
+        further = cursor_at(order, shown[-1][0]) if len(keys) > limit and shown else ""
         return AssetPage(tuple(self._entry(row) for row in shown), further, total)
 
     def facets(self, query: AssetQuery) -> dict[str, dict[str, int]]:
@@ -116,30 +118,32 @@ class AssetCatalogue:
         what matches.
         """
         row = AssetVersionRow
-        with self._database.reading() as session:
-
-            def counts(field: str, value: ColumnElement[Any], by: ColumnElement[Any]) -> dict[str, int]:
-                matching = (row.shown.is_(True), *conditions(query, without=field))
-                number = func.count().label("number")
-                grouped = select(value, number).select_from(row).where(*matching).group_by(by)
-                return _largest_first(session.execute(grouped).all())
-
-            return {
-                "class": counts("asset_class", row.asset_class.expression, row.asset_class.expression),
-                "state": counts("states", row.state.expression, row.state.expression),
-                "licence": counts("licences", func.min(row.licence), row.licence_folded.expression),
-                "tag": self._tag_counts(session, query),
-            }
-
-    def _tag_counts(self, session: Session, query: AssetQuery) -> dict[str, int]:
-        row = AssetVersionRow
-        grouped = (
-            select(AssetTagRow.tag, func.count())
-            .join(row, row.key == AssetTagRow.version_key)
-            .where(row.shown.is_(True), *conditions(query))
-            .group_by(AssetTagRow.tag)
+        groups = (row.asset_class, row.state, row.licence)
+        rest = conditions(query, without=("asset_class", "states", "licences"))
+        counted = (
+            select(*groups, func.count(), func.aggregate_strings(row.tags, " "))
+            .where(row.shown.is_(True), *rest)
+            .group_by(*groups)
         )
-        return _largest_first(session.execute(grouped).all())
+        counts: dict[str, Counter[str]] = {name: Counter() for name in ("class", "state", "licence", "tag")}
+        spellings: dict[str, str] = {}
+        wanted = {name.casefold() for name in query.licences}
+        with self._database.reading() as session:
+            found = session.execute(counted.order_by(row.licence)).all()
+        for asset_class, state, licence, number, tags in found:
+            spelling = spellings.setdefault(licence.casefold(), licence)
+            in_class = query.asset_class in ("", asset_class)
+            in_state = not query.states or state in query.states
+            in_licence = not wanted or licence.casefold() in wanted
+            if in_state and in_licence:
+                counts["class"][asset_class] += number
+            if in_class and in_licence:
+                counts["state"][state] += number
+            if in_class and in_state:
+                counts["licence"][spelling] += number
+            if in_class and in_state and in_licence:
+                counts["tag"].update(tags.split())
+        return {name: _largest_first(counter) for name, counter in counts.items()}
 
     def candidates(self, query: AssetQuery) -> tuple[tuple[str, str], ...]:
         """Return (id, manifest digest) of what a draw may choose from, sorted by id.
@@ -237,5 +241,5 @@ def _near_ids(session: Session, asset_id: str) -> list[str]:
     return list(dict.fromkeys(ids))
 
 
-def _largest_first(rows: Iterable[Any]) -> dict[str, int]:
-    return {str(value): int(number) for value, number in sorted(rows, key=lambda pair: (-pair[1], pair[0]))}
+def _largest_first(counts: Counter[str]) -> dict[str, int]:
+    return dict(sorted(counts.items(), key=lambda pair: (-pair[1], pair[0])))

@@ -11,7 +11,7 @@ from typing import Final
 from fullwell.assets.classes import asset_class
 from fullwell.assets.materials.catalogue import asset_material
 from fullwell.assets.records import AssetManifest, LicenceRecord, PartRecord, check_tags
-from fullwell.assets.store import check_digest
+from fullwell.assets.store import StoredManifest, check_digest
 from fullwell.core import FieldError, canonical_json, unknown_name_message
 
 __all__ = ["AssetChanges", "check_text", "storable"]
@@ -33,7 +33,7 @@ def check_text(text: str, *, path: str, most: int = MAX_LINE) -> str:
     return stripped
 
 
-def storable(manifest: AssetManifest) -> AssetManifest:
+def storable(manifest: AssetManifest) -> StoredManifest:
     """Return a manifest as it will come back from the store, with the digest that it will have.
 
     Raises
@@ -64,7 +64,8 @@ def storable(manifest: AssetManifest) -> AssetManifest:
             "Merge parts or leave generator parameters out.",
             path="manifest",
         )
-    return AssetManifest.from_document(json.loads(document))
+    # Once there and back: 4 in a size becomes 4.0, and the digest is then that of the manifest that comes out again.
+    return StoredManifest.from_content(canonical_json(AssetManifest.from_document(json.loads(document)).document()))
 
 
 @dataclass(frozen=True, slots=True)

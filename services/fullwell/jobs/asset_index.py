@@ -14,8 +14,7 @@ from typing import Any, Final, TypeVar, cast
 from sqlalchemy import delete, insert, select, text, update
 from sqlalchemy.orm import Session
 
-from fullwell.assets.records import AssetManifest
-from fullwell.core import canonical_json
+from fullwell.assets.store import StoredManifest
 from fullwell.jobs.asset_files import AssetFile, Standing, standing_of
 from fullwell.jobs.asset_records import EventKind
 from fullwell.jobs.asset_rows import AssetEventRow, AssetManifestRow, AssetTagRow, AssetVersionRow, AssetWordRow
@@ -47,7 +46,7 @@ def pieces(items: Sequence[_Item], size: int = PIECE) -> Iterator[Sequence[_Item
         yield items[start : start + size]
 
 
-def index_files(session: Session, files: Collection[AssetFile], manifests: Mapping[str, AssetManifest]) -> int:
+def index_files(session: Session, files: Collection[AssetFile], manifests: Mapping[str, StoredManifest]) -> int:
     """Bring the tables to where they know these files, too; return how many were new.
 
     Parameters
@@ -113,7 +112,7 @@ def _insert_events(session: Session, files: Sequence[AssetFile]) -> None:
         session.execute(insert(AssetEventRow), rows)
 
 
-def _insert_versions(session: Session, files: Sequence[AssetFile], manifests: Mapping[str, AssetManifest]) -> None:
+def _insert_versions(session: Session, files: Sequence[AssetFile], manifests: Mapping[str, StoredManifest]) -> None:
     if not files:
         return
     digests = sorted({file.digest for file in files})
@@ -121,9 +120,7 @@ def _insert_versions(session: Session, files: Sequence[AssetFile], manifests: Ma
     for part in pieces(digests):
         stored.update(session.scalars(select(AssetManifestRow.digest).where(AssetManifestRow.digest.in_(part))))
     documents = [
-        {"digest": digest, "document_json": canonical_json(manifests[digest].document()).decode()}
-        for digest in digests
-        if digest not in stored
+        {"digest": digest, "document_json": manifests[digest].content.decode()} for digest in digests if digest not in stored
     ]
     if documents:
         session.execute(insert(AssetManifestRow), documents)
@@ -132,25 +129,28 @@ def _insert_versions(session: Session, files: Sequence[AssetFile], manifests: Ma
         [_version_values(file, manifests[file.digest]) for file in files],
     ).all()
     tags = [
-        {"tag": tag, "version_key": key} for key, file in zip(keys, files, strict=True) for tag in manifests[file.digest].tags
+        {"tag": tag, "version_key": key}
+        for key, file in zip(keys, files, strict=True)
+        for tag in manifests[file.digest].manifest.tags
     ]
     words = [
         {"word": word, "version_key": key}
         for key, file in zip(keys, files, strict=True)
-        for word in sorted(words_of(manifests[file.digest]))
+        for word in sorted(words_of(manifests[file.digest].manifest))
     ]
     for table, rows in ((AssetTagRow, tags), (AssetWordRow, words)):
         if rows:
             session.execute(insert(table), rows)
 
 
-def _version_values(file: AssetFile, manifest: AssetManifest) -> dict[str, Any]:
+def _version_values(file: AssetFile, stored: StoredManifest) -> dict[str, Any]:
+    manifest = stored.manifest
     length_m, width_m, height_m = manifest.size_m
     return {
         "asset_id": file.id,
         "version": file.version,
         "digest": file.digest,
-        "look_digest": manifest.look_digest,
+        "look_digest": stored.look_digest,
         "kind": file.kind,
         "line": file.line,
         "shown": False,
@@ -160,6 +160,7 @@ def _version_values(file: AssetFile, manifest: AssetManifest) -> dict[str, Any]:
         "title_folded": manifest.title.casefold()[:400],
         "licence": manifest.licence.spdx,
         "licence_folded": manifest.licence.spdx.casefold(),
+        "tags": " ".join(manifest.tags),
         "length_m": length_m,
         "width_m": width_m,
         "height_m": height_m,

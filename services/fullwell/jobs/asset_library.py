@@ -8,19 +8,20 @@ from __future__ import annotations
 
 import contextlib
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 from sqlalchemy import delete, func, insert, select
 from sqlalchemy.orm import Session
 
 from fullwell.assets.archive import ArchivedAsset, ExportReport, open_archive, write_archive
 from fullwell.assets.query import REVIEW_STATES, AssetQuery, ReviewState
-from fullwell.assets.records import AssetManifest, LicenceRecord, PreparedAsset
-from fullwell.assets.store import blob_key, check_digest, preview_key, preview_names, put_preview
-from fullwell.core import AssetError, ConflictError, FieldError, NotFoundError, canonical_json, sha256_hex
+from fullwell.assets.records import LicenceRecord, PreparedAsset
+from fullwell.assets.store import StoredManifest, blob_key, check_digest, preview_key, preview_names, put_preview
+from fullwell.core import AssetError, ConflictError, FieldError, NotFoundError, sha256_hex
 from fullwell.jobs.asset_catalogue import AssetCatalogue
 from fullwell.jobs.asset_changes import AssetChanges, check_text, storable
 from fullwell.jobs.asset_files import AssetFile, next_micros
@@ -47,6 +48,10 @@ HOLD_S: Final = 3600.0
 """How long garbage collection leaves blobs that an addition is about to refer to."""
 MAX_REASON: Final = 2000
 _ATTEMPTS: Final = 50
+_STORE_THREADS: Final = 8
+
+_Item = TypeVar("_Item")
+_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,38 +99,43 @@ class AssetLibrary(AssetCatalogue):
 
     def _add(self, prepared: PreparedAsset, *, who: str) -> tuple[AssetEntry, bool]:
         """Return the entry, and whether it is a new version."""
-        manifest = storable(prepared.manifest)
-        self._put_blobs(manifest, prepared.blobs)
+        stored = storable(prepared.manifest)
+        manifest, digest = stored.manifest, stored.digest
+        self._put_blobs([stored], prepared.blobs)
         for _ in range(_ATTEMPTS):
             past = self._pasts([manifest.id])[manifest.id]
-            if past.latest is not None and past.imported_digest == manifest.digest:
+            if past.latest is not None and past.imported_digest == digest:
                 return (self.restore(manifest.id, who=who) if past.latest.retired else past.latest), False
             number = past.last_version + 1
             micros = next_micros(self._now(), past.last_name)
-            file = AssetFile.of_version(manifest.id, number, line=number, digest=manifest.digest, who=who, micros=micros)
+            file = AssetFile.of_version(manifest.id, number, line=number, digest=digest, who=who, micros=micros)
             if self._put_version(file):
-                self._index([file], {file.digest: manifest})
+                self._index([file], {digest: stored})
                 return self.get(manifest.id, number), True
         raise _busy([manifest.id])
 
-    def _put_blobs(self, manifest: AssetManifest, given: Mapping[str, bytes]) -> None:
+    def _put_blobs(self, manifests: Sequence[StoredManifest], given: Mapping[str, bytes]) -> None:
+        """Store the manifests and the blobs that they name; nothing where a blob is wrong, or neither given nor there."""
         for digest, content in given.items():
             if (found := sha256_hex(content)) != digest:
-                raise AssetError(f"a blob of asset {manifest.id!r} is named {digest[:80]} but has SHA-256 {found}.")
-        contents: dict[str, bytes] = {**given, manifest.digest: canonical_json(manifest.document())}
-        needed = sorted(manifest.blobs() | {manifest.digest})
+                raise AssetError(
+                    f"a blob of asset {manifests[0].manifest.id!r} is named {digest[:80]} but has SHA-256 {found}."
+                )
+        contents = {**given, **{stored.digest: stored.content for stored in manifests}}
+        needed = {
+            digest: stored.manifest.id for stored in manifests for digest in (*sorted(stored.manifest.blobs()), stored.digest)
+        }
         # Held before they are looked for: what is there now stays there until a version refers to it.
         self.hold(needed)
-        for digest in needed:
-            stored_bytes = self._stored_bytes(digest)
-            wanted = contents.get(digest)
-            if wanted is None and stored_bytes is None:
+        stored_bytes = dict(zip(needed, _in_parallel(self._stored_bytes, list(needed)), strict=True))
+        for digest, asset_id in needed.items():
+            if digest not in contents and stored_bytes[digest] is None:
                 raise AssetError(
-                    f"asset {manifest.id!r} names the blob {digest}, which is neither given nor in the store. Upload it first."
+                    f"asset {asset_id!r} names the blob {digest}, which is neither given nor in the store. Upload it first."
                 )
-            # An object of another size was damaged in the store; this mends it.
-            if wanted is not None and stored_bytes != len(wanted):
-                self.store.put(blob_key(digest), wanted)
+        # An object of another size was damaged in the store; this mends it.
+        new = [digest for digest in needed if digest in contents and stored_bytes[digest] != len(contents[digest])]
+        _in_parallel(lambda digest: self.store.put(blob_key(digest), contents[digest]), new)
 
     def _stored_bytes(self, digest: str) -> int | None:
         try:
@@ -228,26 +238,30 @@ class AssetLibrary(AssetCatalogue):
     def _edit_once(self, ids: Sequence[str], changes: AssetChanges, *, who: str, expected_version: int | None) -> list[str]:
         """Edit assets; return those of which another writer has made a version at the same moment."""
         pasts = self._existing(ids, expected_version)
-        manifests: dict[str, AssetManifest] = {}
+        manifests: dict[str, StoredManifest] = {}
         files: list[AssetFile] = []
         now = self._now()
         for asset_id, (latest, past) in pasts.items():
             changed, detail = changes.apply(latest.manifest)
             if not detail:
                 continue
-            changed = storable(changed)
-            manifests[changed.digest] = changed
+            stored = storable(changed)
+            manifests[stored.digest] = stored
             micros = next_micros(now, past.last_name)
             file = AssetFile.of_version(
-                asset_id, past.last_version + 1, line=past.line, digest=changed.digest, who=who, micros=micros, detail=detail
+                asset_id, past.last_version + 1, line=past.line, digest=stored.digest, who=who, micros=micros, detail=detail
             )
             files.append(file)
-        for manifest in manifests.values():
-            self._put_blobs(manifest, {})
+        self._put_blobs(list(manifests.values()), {})
         written: list[AssetFile] = []
+
+        def write(file: AssetFile) -> None:
+            if self._put_version(file):
+                written.append(file)
+
         try:
-            written += (file for file in files if self._put_version(file))
-        finally:
+            _in_parallel(write, files)
+        finally:  # where the store fails in the middle, the rows follow what it has taken
             self._index(written, manifests)
         return [file.id for file in files if file not in written]
 
@@ -344,10 +358,13 @@ class AssetLibrary(AssetCatalogue):
 
     def _write_events(self, files: Sequence[AssetFile]) -> None:
         written: list[AssetFile] = []
+
+        def write(file: AssetFile) -> None:
+            self.store.put(file.key, file.content(), if_absent=True)
+            written.append(file)
+
         try:
-            for file in files:
-                self.store.put(file.key, file.content(), if_absent=True)
-                written.append(file)
+            _in_parallel(write, files)
         finally:  # where the store fails in the middle, the rows follow what it has taken
             self._index(written, {})
 
@@ -361,7 +378,7 @@ class AssetLibrary(AssetCatalogue):
             return False
         return True
 
-    def _index(self, files: Sequence[AssetFile], manifests: Mapping[str, AssetManifest]) -> None:
+    def _index(self, files: Sequence[AssetFile], manifests: Mapping[str, StoredManifest]) -> None:
         if files:
             with assets_locked(self._database) as session:
                 index_files(session, files, manifests)
@@ -477,6 +494,15 @@ def _check_reason(latest: AssetEntry, decision: ReviewState, reason: str) -> Non
             path="reason",
             value="",
         )
+
+
+def _in_parallel(function: Callable[[_Item], _Result], items: Sequence[_Item]) -> list[_Result]:
+    """Return the results in order; all calls have ended when the first error is raised. For waiting on the object store."""
+    if len(items) < 2:
+        return [function(item) for item in items]
+    with ThreadPoolExecutor(min(_STORE_THREADS, len(items)), "fullwell-assets") as threads:
+        futures = [threads.submit(function, item) for item in items]
+    return [future.result() for future in futures]
 
 
 def _busy(ids: Sequence[str]) -> ConflictError:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator
 
 import structlog
 from sqlalchemy import select
 
-from fullwell.assets.records import AssetManifest
-from fullwell.assets.store import blob_key
+from fullwell.assets.store import StoredManifest, blob_key
 from fullwell.core import AssetError, FieldError, NotFoundError, sha256_hex
 from fullwell.jobs.asset_files import AssetFile, file_from, is_asset_file, place_of
 from fullwell.jobs.asset_index import assets_locked, index_files
@@ -29,13 +27,13 @@ def read_file(store: ObjectStore, key: str) -> AssetFile:
     return file_from(key, store.get(key))
 
 
-def read_manifest(store: ObjectStore, digest: str) -> AssetManifest:
+def read_manifest(store: ObjectStore, digest: str) -> StoredManifest:
     """Return a manifest of the store. Raises AssetError where it is absent or damaged."""
     try:
         content = store.get(blob_key(digest))
         if sha256_hex(content) != digest:
             raise ValueError("its content has another SHA-256")
-        return AssetManifest.from_document(json.loads(content))
+        return StoredManifest.from_content(content)
     except (NotFoundError, ValueError, AttributeError, FieldError) as error:
         raise AssetError(f"the manifest {digest} cannot be read: {error} Import the asset again.") from error
 
@@ -55,14 +53,14 @@ def _read(store: ObjectStore, keys: Iterable[str], *, passing_over: bool) -> Ite
             log.warning("damaged file of an asset", object=key, cause=str(error))
 
 
-def manifests_of(store: ObjectStore, files: Iterable[AssetFile], *, passing_over: bool = False) -> dict[str, AssetManifest]:
+def manifests_of(store: ObjectStore, files: Iterable[AssetFile], *, passing_over: bool = False) -> dict[str, StoredManifest]:
     """Return {digest: manifest} of the versions among files; collected ones have none.
 
     One that cannot be read is logged and passed over, or raises AssetError.
     """
     files = list(files)
     collected = {(file.id, file.version) for file in files if file.kind == "collected"}
-    manifests: dict[str, AssetManifest] = {}
+    manifests: dict[str, StoredManifest] = {}
     for file in files:
         if not file.is_version or file.digest in manifests or (file.id, file.version) in collected:
             continue

@@ -35,6 +35,7 @@ class AssetVersionRow(Base):
 
     `line` is the version whose import brought the content that this one shows; edits stay on its line, and a decision about
     one version of a line is about all. `shown` marks the newest version of an asset that is not retired: what searches see.
+    `tags`, with spaces between, are for counting; conditions on tags use AssetTagRow.
     """
 
     __tablename__ = "asset_versions"
@@ -42,6 +43,10 @@ class AssetVersionRow(Base):
         UniqueConstraint("asset_id", "version"),
         Index("ix_asset_versions_shown_asset_id", "shown", "asset_id"),
         Index("ix_asset_versions_shown_created_at", "shown", "created_at", "asset_id"),
+        Index("ix_asset_versions_shown_title_folded", "shown", "title_folded", "asset_id"),
+        Index("ix_asset_versions_shown_extent_m", "shown", "extent_m", "asset_id"),
+        Index("ix_asset_versions_shown_triangles", "shown", "triangles", "asset_id"),
+        Index("ix_asset_versions_facets", "shown", "asset_class", "state", "licence", "tags"),
     )
 
     key: Mapped[int] = mapped_column(_Key, primary_key=True, autoincrement=True)
@@ -58,6 +63,7 @@ class AssetVersionRow(Base):
     title_folded: Mapped[str] = mapped_column(_ordered_text(400))
     licence: Mapped[str] = mapped_column(Text)
     licence_folded: Mapped[str] = mapped_column(Text)
+    tags: Mapped[str] = mapped_column(Text)
     length_m: Mapped[float] = mapped_column(Float)
     width_m: Mapped[float] = mapped_column(Float)
     height_m: Mapped[float] = mapped_column(Float)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import binascii
 import json
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Any, Final
 
 from sqlalchemy import ColumnElement, and_, or_, select
@@ -44,11 +44,11 @@ def _words(text: str) -> list[str]:
     return [word[:MAX_WORD_CHARACTERS] for word in spaced.split()]
 
 
-def conditions(query: AssetQuery, *, without: str = "") -> list[ColumnElement[bool]]:
-    """Return the conditions on AssetVersionRow under which the version matches; the field `without` is left out."""
+def conditions(query: AssetQuery, *, without: Collection[str] = ()) -> list[ColumnElement[bool]]:
+    """Return the conditions on AssetVersionRow under which the version matches; those of the fields `without` are left out."""
     if len(query.ids) > MAX_IDS:
         raise FieldError(f"ids has {len(query.ids)} entries; at most {MAX_IDS} are allowed.", "ids", len(query.ids))
-    return [condition for field, condition in _conditions(query) if field != without]
+    return [condition for field, condition in _conditions(query) if field not in without]
 
 
 def _conditions(query: AssetQuery) -> Iterator[tuple[str, ColumnElement[bool]]]:

@@ -62,6 +62,7 @@ def _create_versions() -> None:
         sa.Column("title_folded", _ordered_text(400), nullable=False),
         sa.Column("licence", sa.Text(), nullable=False),
         sa.Column("licence_folded", sa.Text(), nullable=False),
+        sa.Column("tags", sa.Text(), nullable=False),
         *(sa.Column(name, sa.Float(), nullable=False) for name in ("length_m", "width_m", "height_m", "extent_m")),
         sa.Column("triangles", sa.BigInteger(), nullable=False),
         sa.Column("created_at", sa.Float(), nullable=False),
@@ -75,7 +76,10 @@ def _create_versions() -> None:
     )
     op.create_index("ix_asset_versions_digest", "asset_versions", ["digest"])
     op.create_index("ix_asset_versions_shown_asset_id", "asset_versions", ["shown", "asset_id"])
-    op.create_index("ix_asset_versions_shown_created_at", "asset_versions", ["shown", "created_at", "asset_id"])
+    for column in ("created_at", "title_folded", "extent_m", "triangles"):
+        op.create_index(f"ix_asset_versions_shown_{column}", "asset_versions", ["shown", column, "asset_id"])
+    facets = ["shown", "asset_class", "state", "licence", "tags"]
+    op.create_index("ix_asset_versions_facets", "asset_versions", facets)
 
 
 def _create_words() -> None:
