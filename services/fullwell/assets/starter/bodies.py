@@ -232,7 +232,7 @@ def posed(build: Build, pose: Pose) -> Skeleton:
     trunk = m["shoulder_height"] - m["hip_height"]
     waist = hips + pelvis @ np.array([0.0, 0.0, 0.36 * trunk])
     neck = waist + chest @ np.array([-0.006 * h, 0.0, 0.64 * trunk + 0.022 * h])
-    skull = neck + (chest @ _turn("y", 9.0)) @ np.array([0.0, 0.0, m["chin_height"] - m["shoulder_height"]])
+    skull = neck + (chest @ _turn("y", 9.0)) @ np.array([0.0, 0.0, m["chin_height"] - m["shoulder_height"] - 0.022 * h])
     joints = {"hips": hips, "waist": waist, "neck": neck, "chin": skull}
     frames = {"pelvis": pelvis, "chest": chest, "head": head}
     for index, side in enumerate(SIDES):
@@ -460,11 +460,11 @@ class Body:
             return blob(at(*centre), np.asarray(half_axes) * unit, turn)
 
         nose = Limb(
-            at(0.086, 0, 0.122),
-            at(0.107, 0, 0.084),
+            at(0.088, 0, 0.124),
+            at(0.111, 0, 0.085),
             turn[:, 0],
             (0, 0.6, 1),
-            _floats(np.array([0.006, 0.008, 0.010]) * unit),
+            _floats(np.array([0.005, 0.007, 0.009]) * unit),
             _floats(np.array([0.008, 0.009, 0.009]) * unit),
         )
         solids = [
@@ -496,14 +496,14 @@ class Body:
     def eyes(self) -> list[Solid]:
         """Dark slits in the sockets: what eyes are from across a street."""
         at, unit, turn = self._head_axes()
-        return [blob(at(0.0845, s * 0.032, 0.1125), np.array([0.0072, 0.0115, 0.0042]) * unit, turn) for s in (1.0, -1.0)]
+        return [blob(at(0.0850, s * 0.032, 0.1125), np.array([0.0075, 0.0125, 0.0048]) * unit, turn) for s in (1.0, -1.0)]
 
     def brows(self) -> list[Limb]:
         """Eyebrows."""
         at, unit, turn = self._head_axes()
         thin = _floats(np.array([0.0045, 0.0045, 0.003]) * unit)
         return [
-            Limb(at(0.0945, s * 0.014, 0.128), at(0.082, s * 0.050, 0.130), turn[:, 0], (0, 0.5, 1), thin, thin)
+            Limb(at(0.0965, s * 0.014, 0.1285), at(0.0855, s * 0.048, 0.1305), turn[:, 0], (0, 0.5, 1), thin, thin)
             for s in (1.0, -1.0)
         ]
 

@@ -67,10 +67,15 @@ class Outfit:
     scarf: str = ""
 
 
-def dressed(body: Body, outfit: Outfit, skin: str, curls_deg: tuple[float, float], rng: np.random.Generator) -> list[BuiltPart]:
-    """Return the parts of a dressed person without hair and belongings, feet wherever the skeleton has them."""
-    parts = [_skin(body, outfit, skin, curls_deg)]
-    parts += _face(body)
+def dressed(
+    body: Body, outfit: Outfit, skin: tuple[str, str], curls_deg: tuple[float, float], rng: np.random.Generator
+) -> list[BuiltPart]:
+    """Return the parts of a dressed person without hair and belongings, feet wherever the skeleton has them.
+
+    `skin` names the materials of skin and eyebrows, `curls_deg` is how far the fingers of either hand are bent.
+    """
+    parts = [_skin(body, outfit, skin[0], curls_deg)]
+    parts += _face(body, skin[1])
     if outfit.top != "dress":
         parts += _bottom(body, outfit, rng)
     elif outfit.bottom == "tights":
@@ -97,7 +102,7 @@ def _skin(body: Body, outfit: Outfit, skin: str, curls_deg: tuple[float, float])
         mesh(
             [[*head, body.neck()], body.ears()],
             cell_m=fine,
-            blend_m=0.022,
+            blend_m=0.016,
             between_m=0.008,
             carved=sockets,
             carve_blend_m=0.012,
@@ -118,7 +123,7 @@ def _skin(body: Body, outfit: Outfit, skin: str, curls_deg: tuple[float, float])
         shapes.append(mesh([[*hand[0], *arm], *hand[1:]], cell_m=0.0064, blend_m=0.012, between_m=0.0))
     if outfit.bottom in ("shorts", "skirt", "none"):
         shapes += [_bare_leg(body, outfit, side) for side in SIDES]
-    return BuiltPart("skin", joined(shapes), f"skin/{skin}")
+    return BuiltPart("skin", joined(shapes), skin)
 
 
 def _bare_leg(body: Body, outfit: Outfit, side: Side) -> Shape:
@@ -131,9 +136,10 @@ def _bare_leg(body: Body, outfit: Outfit, side: Side) -> Shape:
     return mesh([bones], cell_m=0.013, blend_m=0.025)
 
 
-def _face(body: Body) -> list[BuiltPart]:
+def _face(body: Body, brows: str) -> list[BuiltPart]:
     eyes = joined([mesh([[eye]], cell_m=0.0035, blend_m=0.0) for eye in body.eyes()])
-    return [BuiltPart("eyes", eyes, "hair/black")]
+    lines = joined([mesh([[brow]], cell_m=0.0035, blend_m=0.0) for brow in body.brows()])
+    return [BuiltPart("eyes", eyes, "hair/black"), BuiltPart("brows", lines, brows)]
 
 
 def _bottom(body: Body, outfit: Outfit, rng: np.random.Generator) -> list[BuiltPart]:
@@ -169,7 +175,7 @@ def _legs(body: Body, cut: str, shank: float, rng: np.random.Generator, folds_m:
 def _closure(body: Body, outfit: Outfit, folds: Folds) -> Shape:
     """The strip of zip or buttons down the front."""
     k = body.scale
-    solids, cuts = _top_trunk(body, outfit, 0.0035)
+    solids, cuts = _top_trunk(body, outfit, 0.006)
     chest = body.frame("chest")
     middle = body.joint("waist") + 0.05 * k * chest[:, 0]
     half = 0.008 if outfit.top != "shirt" else 0.014
@@ -351,7 +357,7 @@ def _scarf(body: Body, rng: np.random.Generator) -> Shape:
     middle = neck.start_m + 0.45 * (neck.end_m - neck.start_m)
     loop = [blob(middle + 0.012 * k * body.frame("chest")[:, 0], np.array([0.088, 0.082, 0.042]) * k, body.frame("chest"))]
     tail_top = body.place("neck", "chest", (0.085 * k, 0.035 * k, 0.02 * k))
-    tail_end = body.place("neck", "chest", (0.150 * k, 0.050 * k, -0.24 * k))
+    tail_end = body.place("neck", "chest", (0.172 * k, 0.052 * k, -0.22 * k))
     thin = (0.012 * k, 0.012 * k, 0.014 * k)
     tail = Limb(
         tail_top, tail_end, body.frame("chest")[:, 0], (0, 0.5, 1), (0.032 * k, 0.042 * k, 0.046 * k), thin, flat_end=True

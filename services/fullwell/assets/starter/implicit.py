@@ -216,8 +216,8 @@ def mesh(
     """Return the surface of a union of groups, closed and smooth.
 
     Solids of a group melt together over `blend_m` [m], groups over `between_m`: the arm melts into the chest, not into the
-    thigh that it hangs beside. Planes in `cuts` and solids in `carved` take away from the whole. `within_m`, (2, 3) corners, spares
-    the search elsewhere: all that the cuts leave must lie inside.
+    thigh that it hangs beside. Planes in `cuts` and solids in `carved` take away from the whole. `within_m`, (2, 3) corners,
+    spares the search elsewhere: all that the cuts leave must lie inside.
     """
     boxes = np.array([solid.bounds_m() for group in groups for solid in group])
     margin = blend_m / 2 + 2.5 * cell_m

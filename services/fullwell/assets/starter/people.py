@@ -68,7 +68,8 @@ def pedestrian(
     pose = replace(pose, stoop=pose.stoop + stoop, nod=pose.nod - 0.5 * stoop)
     body = Body(build, posed(build, pose))
     outfit = Outfit(top, top_colour, bottom, bottom_colour, shoes, shoes_colour, sole_colour, skirt, vest, collar, hood, scarf)
-    parts = dressed(body, outfit, skin, (pose.arms[0].curl, pose.arms[1].curl), rng)
+    brows = head_colour if head_colour.startswith("hair/") else "hair/grey" if "elderly" in tags else "hair/brown"
+    parts = dressed(body, outfit, (f"skin/{skin}", brows), (pose.arms[0].curl, pose.arms[1].curl), rng)
     parts += headwear(body, head, head_colour, rng)
     if carries:
         parts += belongings(body, carries, carries_colour)

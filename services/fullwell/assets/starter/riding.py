@@ -50,7 +50,7 @@ def seated(build: Build, contacts: Contacts, *, look_deg: float = 0.0, toes_down
     # The neck takes back most of the lean: eyes on the road.
     frames["head"] = frames["chest"] @ _about_y(-0.8 * float(lean)) @ _about_z(look_deg)
     joints["chin"] = joints["neck"] + 0.5 * (frames["chest"] + frames["head"])[:, 2] * (
-        lengths["chin_height"] - lengths["shoulder_height"]
+        lengths["chin_height"] - lengths["shoulder_height"] - 0.022 * build.stature_m
     )
     for index, side in enumerate(SIDES):
         _place_arm(joints, frames, lengths, wrists[index], side)

@@ -260,7 +260,7 @@ def _bough(
     parent = max(min(below, len(stem_z) - 2), 0)
     start = np.array([nodes[parent][0], nodes[parent][1], z_m])
     # The bough begins at its own height: one node there, hanging on the stem.
-    hang = 0.42 * share + 0.05
+    hang = min(0.42 * share + 0.05, max((z_m - 0.4) / (0.34 * length_m), 0.0))  # the lowest clear the ground
     previous = parent
     for step in range(count + 1):
         t = step / count
@@ -524,7 +524,7 @@ TREES: Final = (
         height_m=4.6,
         crown_radius_m=1.25,
         trunk_radius_m=0.06,
-        bare_m=0.25,
+        bare_m=0.45,
         spacing_m=0.24,
         sprays=13000,
         needle_m=(0.13, 0.05),
