@@ -79,8 +79,8 @@ def load_model(
     max_triangles, max_bytes
         Refused above.
     by_object
-        Name parts after the nodes of a glTF file instead of its meshes, and split an OBJ file by its objects (or groups, where
-        it has no objects) as well as by material: "wheel_front_left/rubber".
+        Name parts after the nodes of a glTF file instead of its meshes ("wheel/rubber" where a node has several materials), and
+        split an OBJ file by its objects (or groups, where it has no objects) as well as by material ("wheel_rubber").
     variants
         {name of a variant set, or "/prim/path{name}" for one prim's: choice} in place of a USD stage's own choices.
     subdivide
@@ -263,7 +263,7 @@ def _trimesh_meshes(
         ) from error
 
 
-def _stated_node(scene: Any, node: str, geometry_name: str) -> str:
+def _stated_node(scene: Any, node: str) -> str:
     """The node that the file states: of several primitives each has a node below it, with six random characters."""
     parent = scene.graph.transforms.parents.get(node)
     return str(parent) if parent is not None and _made_node(node, str(parent)) else node
@@ -276,12 +276,12 @@ def _made_node(node: str, parent: str) -> bool:
 def _node_order(scene: Any, node: str) -> tuple[str, str]:
     """Order of nodes that does not depend on the random names that some are given."""
     geometry_name = scene.graph[node][1]
-    return _stated_node(scene, node, geometry_name), geometry_name
+    return _stated_node(scene, node), geometry_name
 
 
 def _object_name(scene: Any, node: str, geometry_name: str, mesh: Trimesh) -> str:
     """Name by object: a node's, with the material behind it where the node has several; else the mesh's."""
-    stated = _stated_node(scene, node, geometry_name)
+    stated = _stated_node(scene, node)
     if stated == node and (node.isdigit() or node == geometry_name):
         return geometry_name
     material = str(getattr(getattr(mesh.visual, "material", None), "name", None) or "")

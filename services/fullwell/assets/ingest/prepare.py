@@ -91,9 +91,10 @@ def prepare_file(
         raise
     except FieldError as error:
         # Where the files happen to lie is nobody's business: uploads are in a temporary folder.
-        place = f"{source.root}/" if source is not None else f"{files_dir.resolve()}/"
-        value = error.value.replace(place, "") if isinstance(error.value, str) else error.value
-        raise IngestError(error.message.replace(place, ""), error.path or "file", value) from error
+        place = str(files_dir.resolve() if source is None else source.root)
+        message = error.message.replace(f"{place}/", "").replace(place, "the folder of the files")
+        value = error.value.replace(f"{place}/", "") if isinstance(error.value, str) else error.value
+        raise IngestError(message, error.path or "file", value) from error
     except MemoryError as error:
         raise IngestError(f"{main} needs more memory than there is. Simplify the model.", "file", main, "memory") from error
     return _assembled(model, source, files, options, say)
@@ -300,9 +301,6 @@ def _chosen_materials(parts: Sequence[LoadedPart], asset_class: str) -> tuple[li
     chosen = []
     for part in parts:
         choice = choose_material(part.name, asset_class, part)
-        if choice.origin in ("upsampled", "texture") and part.material_name and part.material_name != part.name:
-            other = choose_material(part.material_name, asset_class, part)
-            choice = choice if other.origin in ("upsampled", "texture") else other
         chosen.append(_ChosenPart(_in_colours_of(part, choice), choice, is_paintable(part.name, asset_class, choice)))
     fallback = [entry.part.name for entry in chosen if entry.choice.origin in ("upsampled", "texture")]
     numbers = {"parts": float(len(chosen)), "fallback": float(len(fallback))}
