@@ -108,6 +108,7 @@ def import_models(
     """Take models in: read, check, mend, and store them; they wait for a review then. Exit code 1 if one was refused."""
     from fullwell.cli.asset_store import Described
 
+    _check_words(asset_class, licence)
     models = _models_of(paths, recursive=recursive)
     if len(models) > 1 and (asset_id or title):
         raise typer.BadParameter(f"--id and --title are for one model; there are {len(models)}.")
@@ -138,6 +139,18 @@ def import_models(
         _print_import(rows, at_service=bool(rows and rows[0].ingestion_id))
     if any(row.error for row in rows):
         raise typer.Exit(1)
+
+
+def _check_words(class_name: str, licence: str) -> None:
+    """Refuse what every model would be refused for, before any is read."""
+    from fullwell.assets.classes import asset_class
+    from fullwell.assets.licences import check_licence
+
+    try:
+        asset_class(class_name, path="--class")
+        check_licence(licence, path="--licence")
+    except FieldError as error:
+        raise typer.BadParameter(str(error)) from None
 
 
 def _models_of(paths: list[Path], *, recursive: bool) -> list[Path]:
@@ -245,16 +258,18 @@ def _print_import(rows: list[_Row], *, at_service: bool) -> None:
     console = _console()
     for row in rows:
         if row.asset is None:
-            console.print(f"[bold red]refused[/]  {escape(str(row.path))}: {escape(row.error)}")
+            console.print(f"[bold red] refused[/]  {escape(str(row.path))}: {escape(row.error)}", soft_wrap=True)
             continue
         if not row.is_new:
             console.print(f"{row.asset.id} is here already, as version {row.asset.version}.")
         _print_findings(console, row.asset)
         if row.preview_error:
-            console.print(f"[yellow]{row.asset.id} has no previews: {escape(row.preview_error)}[/]")
+            console.print(f"[yellow]{row.asset.id} has no previews: {escape(row.preview_error)}[/]", soft_wrap=True)
     good = sum(row.asset is not None for row in rows)
     sent = f", {sum(row.sent for row in rows)} of {sum(row.files for row in rows)} files sent" if at_service else ""
-    print(f"{good} of {len(rows)} models are in the store{sent}; fullwell assets approve ID... approves them.")
+    print(f"{good} of {len(rows)} models are in the store{sent}.")
+    if any(row.asset is not None and row.asset.state == "pending" for row in rows):
+        print("They wait for a review: fullwell assets show ID, then approve or reject ID...")
 
 
 def _print_findings(console: Any, asset: Asset) -> None:
