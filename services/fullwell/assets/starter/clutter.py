@@ -8,6 +8,8 @@ the outline of a 6 cubic yard builder's skip (DIN 30720-1).
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,7 +35,13 @@ def cone(rng: np.random.Generator, *, height_m: float = 0.75) -> BuiltAsset:
     def radius(z: float) -> float:
         return r_low + (r_high - r_low) * (z - low) / (high - low)
 
-    profile = [(0.0, low), (r_low + 0.012, low), (radius(low + 0.02), low + 0.02), (radius(high), high), (radius(high) - 0.01, high + 0.0)]
+    profile = [
+        (0.0, low),
+        (r_low + 0.012, low),
+        (radius(low + 0.02), low + 0.02),
+        (radius(high), high),
+        (radius(high) - 0.01, high + 0.0),
+    ]
     profile += [(0.012, high - 0.06), (0.0, high - 0.06)]
     assembly.add("body", "plastic/orange", revolution(profile, sides=28))
     for start, stop in ((0.38, 0.56), (0.72, 0.86)):
@@ -49,7 +57,20 @@ def cone(rng: np.random.Generator, *, height_m: float = 0.75) -> BuiltAsset:
 def plastic_barrier(rng: np.random.Generator, *, colour: str = "red") -> BuiltAsset:
     """Return a water-filled barrier of 1.5 m, 0.8 m high, with fork slots and coupling lugs."""
     assembly = Assembly()
-    profile = np.array([(0.225, 0.0), (0.225, 0.12), (0.14, 0.34), (0.11, 0.72), (0.08, 0.8), (-0.08, 0.8), (-0.11, 0.72), (-0.14, 0.34), (-0.225, 0.12), (-0.225, 0.0)])
+    profile = np.array(
+        [
+            (0.225, 0.0),
+            (0.225, 0.12),
+            (0.14, 0.34),
+            (0.11, 0.72),
+            (0.08, 0.8),
+            (-0.08, 0.8),
+            (-0.11, 0.72),
+            (-0.14, 0.34),
+            (-0.225, 0.12),
+            (-0.225, 0.0),
+        ]
+    )
     material = f"plastic/{colour}"
     cuts = (-0.75, -0.42, -0.18, 0.18, 0.42, 0.75)
     for a, b, hollow in zip(cuts[:-1], cuts[1:], (False, True, False, True, False), strict=True):
@@ -62,7 +83,9 @@ def plastic_barrier(rng: np.random.Generator, *, colour: str = "red") -> BuiltAs
     assembly.add("filler_cap", "plastic/black", cylinder(0.05, 0.025, sides=20).moved(0.0, 0.4, 0.81))
     for side in (1.0, -1.0):
         for z in (0.25, 0.55):
-            assembly.add("lugs", material, cylinder(0.06, 0.06, sides=16).moved(0.0, side * 0.78, z + (0.08 if side > 0 else 0.0)))
+            assembly.add(
+                "lugs", material, cylinder(0.06, 0.06, sides=16).moved(0.0, side * 0.78, z + (0.08 if side > 0 else 0.0))
+            )
     for x, turn in ((0.13, 0.0), (-0.13, 180.0)):
         strip = filled(rectangle(0.9, 0.1), 0.0).turned("y", -4.5).moved(0.0085, 0.0, 0.5)
         assembly.add("reflector", "sign/white", strip.turned("z", turn).moved(x))
@@ -87,7 +110,10 @@ def concrete_barrier(rng: np.random.Generator, *, length_m: float = 3.0) -> Buil
     cuts = (-ends, -0.3 * length_m - 0.2, -0.3 * length_m + 0.2, 0.3 * length_m - 0.2, 0.3 * length_m + 0.2, ends)
     for a, b, hollow in zip(cuts[:-1], cuts[1:], (False, True, False, True, False), strict=True):
         assembly.add("body", "concrete/light", _along_y(raised if hollow else profile, a, b))
-    loops = [tube([(0.0, y - 0.08, 0.79), (0.0, y - 0.06, 0.86), (0.0, y + 0.06, 0.86), (0.0, y + 0.08, 0.79)], 0.01, sides=8) for y in (-0.8, 0.8)]
+    loops = [
+        tube([(0.0, y - 0.08, 0.79), (0.0, y - 0.06, 0.86), (0.0, y + 0.06, 0.86), (0.0, y + 0.08, 0.79)], 0.01, sides=8)
+        for y in (-0.8, 0.8)
+    ]
     assembly.add("lifting_loops", "metal/rust", *loops)
     for y in (-ends - 0.01, ends - 0.03):
         assembly.add("coupling", "metal/steel_galvanised", span((-0.02, y, 0.2), (0.02, y + 0.04, 0.7)))
@@ -103,15 +129,31 @@ def crowd_barrier(rng: np.random.Generator, *, length_m: float = 2.3) -> BuiltAs
     """Return a crowd-control barrier of steel tube: a frame, upright bars, and two flat feet."""
     assembly = Assembly()
     half, low, high = length_m / 2 - 0.06, 0.22, 1.08
-    frame = [(0, -half, low), (0, -half, high - 0.12), (0, -half + 0.12, high), (0, half - 0.12, high), (0, half, high - 0.12), (0, half, low)]
-    assembly.add("frame", "metal/steel_galvanised", tube(frame, 0.019, sides=12), tube([(0, -half, low + 0.05), (0, half, low + 0.05)], 0.017, sides=12))
+    frame = [
+        (0, -half, low),
+        (0, -half, high - 0.12),
+        (0, -half + 0.12, high),
+        (0, half - 0.12, high),
+        (0, half, high - 0.12),
+        (0, half, low),
+    ]
+    assembly.add(
+        "frame",
+        "metal/steel_galvanised",
+        tube(frame, 0.019, sides=12),
+        tube([(0, -half, low + 0.05), (0, half, low + 0.05)], 0.017, sides=12),
+    )
     for y in np.linspace(-half, half, 20)[1:-1]:
         assembly.add("bars", "metal/steel_galvanised", tube([(0, y, low + 0.05), (0, y, high - 0.005)], 0.007, sides=8))
     for y in (-half + 0.25, half - 0.25):
         assembly.add("feet", "metal/steel_galvanised", span((-0.34, y - 0.025, 0.0), (0.34, y + 0.025, 0.012)))
         for x in (-0.2, 0.2):
             assembly.add("feet", "metal/steel_galvanised", tube([(x, y, 0.008), (0.0, y, low + 0.05)], 0.014, sides=10))
-    assembly.add("hooks", "metal/steel_galvanised", *(tube([(0, half, z), (0, half + 0.05, z), (0, half + 0.05, z - 0.08)], 0.008, sides=8) for z in (0.4, 0.85)))
+    assembly.add(
+        "hooks",
+        "metal/steel_galvanised",
+        *(tube([(0, half, z), (0, half + 0.05, z), (0, half + 0.05, z - 0.08)], 0.008, sides=8) for z in (0.4, 0.85)),
+    )
     plate = span((-0.003, -0.25, 0.7), (0.003, 0.25, 0.85))
     assembly.add("plate", "sign/white", plate.moved(0.012))
     return BuiltAsset("barrier", ("crowd", "steel"), assembly.parts(), {})
@@ -130,7 +172,9 @@ def roadworks_board(rng: np.random.Generator) -> BuiltAsset:
         slant = 0.1
         for k in range(count):
             y = -wide / 2 + 0.01 + k * step
-            stripe = np.array([(y, low + 0.01), (y + step / 2, low + 0.01), (y + step / 2 + slant, high - 0.01), (y + slant, high - 0.01)])
+            stripe = np.array(
+                [(y, low + 0.01), (y + step / 2, low + 0.01), (y + step / 2 + slant, high - 0.01), (y + slant, high - 0.01)]
+            )
             stripe[:, 0] = np.minimum(stripe[:, 0], wide / 2 - 0.01)
             face.add("face_red", "sign/red", filled(stripe, 0.0228))
         assembly.place(face, turn_deg=turn)
@@ -141,7 +185,9 @@ def roadworks_board(rng: np.random.Generator) -> BuiltAsset:
         assembly.add("lamp_bodies", "plastic/yellow", span((-0.05, y - 0.06, 1.0), (0.05, y + 0.06, 1.12)))
         lens = revolution([(0.09, 0.0), (0.08, 0.02), (0.05, 0.033), (0.0, 0.04)], sides=24).turned("y", 90)
         assembly.add("lamp_rings", "plastic/black", cylinder(0.1, 0.06, sides=24, axis="x").moved(0.0, y, 1.22))
-        assembly.add("light_amber", "lamp/traffic_amber", lens.moved(0.032, y, 1.22), lens.turned("z", 180).moved(-0.032, y, 1.22))
+        assembly.add(
+            "light_amber", "lamp/traffic_amber", lens.moved(0.032, y, 1.22), lens.turned("z", 180).moved(-0.032, y, 1.22)
+        )
     tags = ("roadworks", "board", "retroreflective")
     return BuiltAsset("barrier", tags, assembly.parts(), {"phases": "on off", "lit_in_on": "light_amber"})
 
@@ -191,7 +237,10 @@ def _carton(assembly: Assembly, size: Array, *, open_top: bool, rng: np.random.G
     card = "wood/pine"
     if not open_top:
         assembly.add("cartons", card, span((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z)))
-        tape = boxes([(-0.03, -y / 2 - 0.001, z - 0.08), (-0.03, -y / 2 - 0.001, z)], [(0.03, y / 2 + 0.001, z), (0.03, y / 2 + 0.001, z + 0.001)])
+        tape = boxes(
+            [(-0.03, -y / 2 - 0.001, z - 0.08), (-0.03, -y / 2 - 0.001, z)],
+            [(0.03, y / 2 + 0.001, z + 0.001), (0.03, y / 2 + 0.001, z + 0.001)],
+        )
         assembly.add("tape", "paper/white", tape)
         return
     wall = 0.006
@@ -200,7 +249,12 @@ def _carton(assembly: Assembly, size: Array, *, open_top: bool, rng: np.random.G
         card,
         span((-x / 2, -y / 2, 0.0), (x / 2, y / 2, 0.01)),
         boxes(
-            [(-x / 2, -y / 2, 0.01), (x / 2 - wall, -y / 2, 0.01), (-x / 2 + wall, -y / 2, 0.01), (-x / 2 + wall, y / 2 - wall, 0.01)],
+            [
+                (-x / 2, -y / 2, 0.01),
+                (x / 2 - wall, -y / 2, 0.01),
+                (-x / 2 + wall, -y / 2, 0.01),
+                (-x / 2 + wall, y / 2 - wall, 0.01),
+            ],
             [(-x / 2 + wall, y / 2, z), (x / 2, y / 2, z), (x / 2 - wall, -y / 2 + wall, z), (x / 2 - wall, y / 2, z)],
         ),
     )
@@ -217,13 +271,22 @@ def skip_container(rng: np.random.Generator, *, colour: str = "yellow") -> Built
     side = np.array([(-1.05, 0.0), (1.05, 0.0), (1.8, 0.9), (1.8, 1.2), (-1.8, 1.2), (-1.8, 0.9)])
     half, wall = 0.83, 0.03
     for sign in (1.0, -1.0):
-        outer = [np.column_stack([side[:, 0], np.full(6, sign * half - offset), side[:, 1]]) for offset in (-wall / 2, wall / 2)]
+        outer = [
+            np.column_stack([side[:, 0], np.full(6, sign * half - offset), side[:, 1]]) for offset in (-wall / 2, wall / 2)
+        ]
         assembly.add("body", paint, loft(np.array(outer)))
     sheet = [(-1.8, 1.2), (-1.8, 0.9), (-1.05, 0.02), (1.05, 0.02), (1.8, 0.9), (1.8, 1.2)]
     inside, out = [], []
-    for (ax, az), (bx, bz) in zip(sheet[:-1], sheet[1:], strict=True):
+    for (ax, az), (bx, bz) in itertools.pairwise(sheet):
         inside.append([(ax, -half, az), (bx, -half, bz), (bx, half, bz), (ax, half, az)])
-        out.append([(ax * 1.01, half, az - 0.015), (bx * 1.01, half, bz - 0.015), (bx * 1.01, -half, bz - 0.015), (ax * 1.01, -half, az - 0.015)])
+        out.append(
+            [
+                (ax * 1.01, half, az - 0.015),
+                (bx * 1.01, half, bz - 0.015),
+                (bx * 1.01, -half, bz - 0.015),
+                (ax * 1.01, -half, az - 0.015),
+            ]
+        )
     plates = np.array(out)
     plates[..., 2] = np.maximum(plates[..., 2], 0.005)
     assembly.add("body", paint, quads(np.array(inside)), quads(plates))
@@ -232,7 +295,9 @@ def skip_container(rng: np.random.Generator, *, colour: str = "yellow") -> Built
     assembly.add("rim", paint, boxes(rim, rim_high))
     for x in (-0.75, 0.75):
         for sign in (1.0, -1.0):
-            assembly.add("lugs", "metal/steel_galvanised", cylinder(0.045, 0.12, sides=16, axis="y").moved(x, sign * (half + 0.06), 0.8))
+            assembly.add(
+                "lugs", "metal/steel_galvanised", cylinder(0.045, 0.12, sides=16, axis="y").moved(x, sign * (half + 0.06), 0.8)
+            )
             ys = sorted((sign * (half + 0.01), sign * (half + 0.05)))
             assembly.add("ribs", paint, span((x - 0.05, ys[0], 0.03), (x + 0.05, ys[1], 1.16)))
     _rubble(assembly, rng)
@@ -249,7 +314,9 @@ def _rubble(assembly: Assembly, rng: np.random.Generator) -> None:
         size = rng.uniform([0.09, 0.1, 0.06], [0.26, 0.3, 0.13])
         x, y = float(rng.uniform(-1.3, 1.3)), float(rng.uniform(-0.62, 0.62))
         z = 0.76 + 0.35 * float(np.exp(-(x**2) / 1.1 - y**2 / 0.4))
-        lump = box(size).turned("x", float(rng.uniform(-40, 40))).turned("z", float(rng.uniform(0, 180))).moved(x, y, z)
+        lump = (
+            box(size.tolist()).turned("x", float(rng.uniform(-40, 40))).turned("z", float(rng.uniform(0, 180))).moved(x, y, z)
+        )
         assembly.add("rubble", ("brick/red", "concrete/grey", "plaster/white")[number % 3], lump)
     assembly.add("planks", "wood/weathered", box((2.4, 0.14, 0.03)).turned("y", -16.0).turned("z", 12.0).moved(0.5, 0.2, 1.3))
 
@@ -260,7 +327,9 @@ def planter(rng: np.random.Generator) -> BuiltAsset:
     outer = [(0.4, 0.0), (0.45, 0.05), (0.5, 0.62), (0.5, 0.68), (0.43, 0.68), (0.42, 0.58)]
     rings = [[(r, -r, z), (r, r, z), (-r, r, z), (-r, -r, z)] for r, z in outer]
     assembly.add("pot", "concrete/light", loft(np.array(rings)))
-    assembly.add("soil", "soil/earth", quads([[(0.43, -0.43, 0.6), (0.43, 0.43, 0.6), (-0.43, 0.43, 0.6), (-0.43, -0.43, 0.6)]]))
+    assembly.add(
+        "soil", "soil/earth", quads([[(0.43, -0.43, 0.6), (0.43, 0.43, 0.6), (-0.43, 0.43, 0.6), (-0.43, -0.43, 0.6)]])
+    )
     assembly.add("foliage_core", "foliage/hedge", sphere(0.33, sides=16).moved(z_m=0.93))
     count = 900
     direction = rng.normal(size=(count, 3))
@@ -279,7 +348,18 @@ def hydrant(rng: np.random.Generator, *, colour: str = "red") -> BuiltAsset:
     """Return a pillar hydrant, 0.76 m high: a ribbed barrel, a bonnet with its nut, one large and two small outlets."""
     assembly = Assembly()
     paint = f"coating/{colour}"
-    barrel = [(0.0, 0.0), (0.17, 0.0), (0.17, 0.03), (0.11, 0.04), (0.1, 0.1), (0.1, 0.36), (0.115, 0.4), (0.115, 0.5), (0.15, 0.515), (0.15, 0.55)]
+    barrel = [
+        (0.0, 0.0),
+        (0.17, 0.0),
+        (0.17, 0.03),
+        (0.11, 0.04),
+        (0.1, 0.1),
+        (0.1, 0.36),
+        (0.115, 0.4),
+        (0.115, 0.5),
+        (0.15, 0.515),
+        (0.15, 0.55),
+    ]
     bonnet = [(0.13, 0.56), (0.12, 0.62), (0.08, 0.68), (0.04, 0.7), (0.04, 0.71), (0.0, 0.715)]
     assembly.add("barrel", paint, revolution([*barrel, *bonnet], sides=28, crease_deg=35.0))
     assembly.add("nuts", "metal/cast_iron", cylinder(0.025, 0.05, sides=5).moved(z_m=0.735))
@@ -299,8 +379,8 @@ def bollard(rng: np.random.Generator) -> BuiltAsset:
     """Return a cast bollard, 1.0 m high, with a retroreflective band."""
     assembly = Assembly()
     profile = [
-        (0.0, 0.0), (0.11, 0.0), (0.11, 0.06), (0.085, 0.09), (0.075, 0.12), (0.06, 0.78), (0.075, 0.8), (0.075, 0.84), (0.055, 0.86),
-        (0.075, 0.91), (0.07, 0.96), (0.04, 0.99), (0.0, 1.0),
+        (0.0, 0.0), (0.11, 0.0), (0.11, 0.06), (0.085, 0.09), (0.075, 0.12), (0.06, 0.78), (0.075, 0.8), (0.075, 0.84),
+        (0.055, 0.86), (0.075, 0.91), (0.07, 0.96), (0.04, 0.99), (0.0, 1.0),
     ]  # fmt: skip
     assembly.add("body", "coating/black", revolution(profile, sides=24, crease_deg=35.0))
     assembly.add("band", "sign/white", revolution([(0.0655, 0.66), (0.0685, 0.66), (0.0665, 0.74), (0.0625, 0.74)], sides=24))
@@ -311,8 +391,21 @@ def post_box(rng: np.random.Generator, *, colour: str = "red") -> BuiltAsset:
     """Return a pillar box, 1.6 m high, with a domed cap, a slot, a collection plate, and a door with its lock."""
     assembly = Assembly()
     paint = f"coating/{colour}"
-    assembly.add("foot", "coating/black", revolution([(0.0, 0.0), (0.255, 0.0), (0.255, 0.16), (0.24, 0.18), (0.0, 0.18)], sides=36))
-    body = [(0.0, 0.18), (0.225, 0.18), (0.225, 1.34), (0.24, 1.35), (0.24, 1.38), (0.275, 1.4), (0.28, 1.44), (0.26, 1.47), (0.16, 1.56), (0.0, 1.6)]
+    assembly.add(
+        "foot", "coating/black", revolution([(0.0, 0.0), (0.255, 0.0), (0.255, 0.16), (0.24, 0.18), (0.0, 0.18)], sides=36)
+    )
+    body = [
+        (0.0, 0.18),
+        (0.225, 0.18),
+        (0.225, 1.34),
+        (0.24, 1.35),
+        (0.24, 1.38),
+        (0.275, 1.4),
+        (0.28, 1.44),
+        (0.26, 1.47),
+        (0.16, 1.56),
+        (0.0, 1.6),
+    ]
     assembly.add("body", paint, revolution(body, sides=36, crease_deg=35.0))
     assembly.add("slot_frame", paint, box((0.04, 0.3, 0.1), centre_m=(0.215, 0.0, 1.22)))
     assembly.add("slot", "plastic/black", box((0.01, 0.24, 0.035), centre_m=(0.2325, 0.0, 1.225)))
@@ -321,7 +414,11 @@ def post_box(rng: np.random.Generator, *, colour: str = "red") -> BuiltAsset:
     assembly.add("plate_lines", "sign/black", *lines)
     door = [_arc_sheet(0.2275, -48, 48, 0.32, 1.12)]
     assembly.add("door", paint, *door)
-    assembly.add("lock", "metal/brass", cylinder(0.014, 0.02, sides=12, axis="x").turned("z", 38).moved(0.228 * np.cos(0.663), 0.228 * np.sin(0.663), 0.75))
+    assembly.add(
+        "lock",
+        "metal/brass",
+        cylinder(0.014, 0.02, sides=12, axis="x").turned("z", 38).moved(0.228 * np.cos(0.663), 0.228 * np.sin(0.663), 0.75),
+    )
     return BuiltAsset("clutter", ("post_box", "uk"), assembly.parts(paintable=("body", "door")), {})
 
 
@@ -334,7 +431,11 @@ def _arc_sheet(radius_m: float, start_deg: float, stop_deg: float, low_m: float,
     def at(points: Array, z: float) -> Array:
         return np.column_stack([points, np.full(len(points), z)])
 
-    strips = [(at(outer, low_m), at(outer, high_m)), (at(outer, high_m), at(inner, high_m)), (at(inner, low_m), at(outer, low_m))]
+    strips = [
+        (at(outer, low_m), at(outer, high_m)),
+        (at(outer, high_m), at(inner, high_m)),
+        (at(inner, low_m), at(outer, low_m)),
+    ]
     return quads(np.concatenate([np.stack([a[:-1], a[1:], b[1:], b[:-1]], axis=1) for a, b in strips])).smooth(30.0)
 
 
@@ -342,10 +443,22 @@ def cabinet(rng: np.random.Generator) -> BuiltAsset:
     """Return a telecoms cabinet: two doors with vents, a plinth, a sloped lid."""
     assembly = Assembly()
     wide, deep, high = 1.1, 0.36, 1.25
-    assembly.add("plinth", "concrete/grey", span((-deep / 2 - 0.02, -wide / 2 - 0.02, 0.0), (deep / 2 + 0.02, wide / 2 + 0.02, 0.12)))
+    assembly.add(
+        "plinth", "concrete/grey", span((-deep / 2 - 0.02, -wide / 2 - 0.02, 0.0), (deep / 2 + 0.02, wide / 2 + 0.02, 0.12))
+    )
     assembly.add("body", "coating/grey", span((-deep / 2, -wide / 2, 0.12), (deep / 2, wide / 2, high)))
-    low = np.array([(deep / 2 + 0.03, -wide / 2 - 0.03), (deep / 2 + 0.03, wide / 2 + 0.03), (-deep / 2 - 0.02, wide / 2 + 0.03), (-deep / 2 - 0.02, -wide / 2 - 0.03)])
-    rings = [np.column_stack([low, np.full(4, high)]), np.column_stack([low, [high + 0.04, high + 0.04, high + 0.1, high + 0.1]])]
+    low = np.array(
+        [
+            (deep / 2 + 0.03, -wide / 2 - 0.03),
+            (deep / 2 + 0.03, wide / 2 + 0.03),
+            (-deep / 2 - 0.02, wide / 2 + 0.03),
+            (-deep / 2 - 0.02, -wide / 2 - 0.03),
+        ]
+    )
+    rings = [
+        np.column_stack([low, np.full(4, high)]),
+        np.column_stack([low, [high + 0.04, high + 0.04, high + 0.1, high + 0.1]]),
+    ]
     assembly.add("lid", "coating/grey", loft(np.array(rings)))
     for a, b in ((-wide / 2 + 0.02, -0.006), (0.006, wide / 2 - 0.02)):
         assembly.add("doors", "coating/grey", span((deep / 2, a, 0.15), (deep / 2 + 0.012, b, high - 0.03)))
@@ -353,7 +466,9 @@ def cabinet(rng: np.random.Generator) -> BuiltAsset:
         vents_low = np.column_stack([np.full(8, deep / 2 + 0.012), np.full(8, a + 0.12), levels])
         vents_high = np.column_stack([np.full(8, deep / 2 + 0.02), np.full(8, b - 0.12), levels + 0.012])
         assembly.add("vents", "plastic/black", boxes(vents_low, vents_high))
-    assembly.add("locks", "metal/steel_brushed", *(box((0.03, 0.03, 0.1), centre_m=(deep / 2 + 0.02, y, 0.75)) for y in (-0.08,)))
+    assembly.add(
+        "locks", "metal/steel_brushed", *(box((0.03, 0.03, 0.1), centre_m=(deep / 2 + 0.02, y, 0.75)) for y in (-0.08,))
+    )
     assembly.add("label", "sign/yellow", filled(polygon(3, 0.07, turn_deg=90) + [0.28, 1.02], deep / 2 + 0.012 + 0.0015))
     assembly.add("label_mark", "sign/black", text("!", 0.06, deep / 2 + 0.012 + 0.003, centre_m=(0.28, 1.02)))
     return BuiltAsset("clutter", ("cabinet", "utility"), assembly.parts(paintable=("body", "doors", "lid")), {})

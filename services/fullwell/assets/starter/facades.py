@@ -7,6 +7,7 @@ inside of a building costs no triangles; what is lit at night are the panes them
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
@@ -129,7 +130,7 @@ def wall(width_m: float, bottom_m: float, top_m: float, openings: Sequence[Openi
     half = width_m / 2
     levels = sorted({bottom_m, top_m, *(z for o in openings for z in (o.bottom_m, o.top_m) if bottom_m < z < top_m)})
     faces = []
-    for low, high in zip(levels[:-1], levels[1:], strict=True):
+    for low, high in itertools.pairwise(levels):
         cut = sorted((o.left_m, o.right_m) for o in openings if o.bottom_m < high - 1e-9 and o.top_m > low + 1e-9)
         edges = [-half, *(edge for pair in cut for edge in pair), half]
         for left, right in zip(edges[::2], edges[1::2], strict=True):
@@ -242,15 +243,13 @@ class Facade:
                 "surrounds",
                 look.trim_material,
                 boxes(
-                    [(-0.02, left - wide, low), (-0.02, right, low), (-0.02, left - wide, high)],
+                    [(0.0, left - wide, low), (0.0, right, low), (0.0, left - wide, high)],
                     [(out, left, high), (out, right + wide, high), (out + 0.004, right + wide, high + wide)],
                 ),
             )
         base = high + (0.15 if look.surround_m > 0 else 0.0)
         if look.head == "lintel":
-            self.assembly.add(
-                "lintels", look.trim_material, span((-0.02, left - 0.12, high), (0.03, right + 0.12, high + 0.22))
-            )
+            self.assembly.add("lintels", look.trim_material, span((0.0, left - 0.12, high), (0.03, right + 0.12, high + 0.22)))
         elif look.head == "soldier":
             self.assembly.add("lintels", look.soldier_material, _soldier_course(left - 0.1, right + 0.1, high))
         elif look.head == "pediment":
@@ -260,10 +259,13 @@ class Facade:
         left, right, low, high = opening.left_m, opening.right_m, opening.bottom_m, opening.top_m
         if look.shutters == "hinged":
             wide = min(opening.width_m / 2, 0.62)
-            for start in (left - wide - 0.04, right + 0.04):
+            gap = 0.04 + (0.15 if look.surround_m > 0 else 0.0)
+            for start in (left - wide - gap, right + gap):
                 self.assembly.add("shutters", look.shutter_material, _louvred_leaf(start, start + wide, low, high))
         elif look.shutters == "roller":
-            self.assembly.add("shutter_boxes", "plastic/white", span((-0.1, left, high - 0.16), (0.012, right, high)))
+            self.assembly.add(
+                "shutter_boxes", "plastic/white", span((-0.1, left + 0.002, high - 0.16), (0.014, right - 0.002, high - 0.002))
+            )
             if self.rng.random() < 0.45:
                 drop = self.rng.choice([0.15, 0.35, 0.55, 0.8]) * (opening.height_m - 0.16)
                 count = max(int(drop / 0.05), 1)
@@ -286,8 +288,8 @@ class Facade:
             self.look.frame_material,
             boxes(
                 [
-                    (-recess, opening.left_m, low),
-                    (-recess, right, low),
+                    (-recess, opening.left_m, low + 0.02),
+                    (-recess, right, low + 0.02),
                     (-recess, left, high),
                     *([(-recess, left, split - frame)] if fanlight_m else []),
                 ],
@@ -315,7 +317,9 @@ class Facade:
                 span((-recess + 0.05, (a + b) / 2 - 0.13, low + 0.95), (-recess + 0.062, (a + b) / 2 + 0.13, low + 1.0)),
             )
         self.assembly.add(
-            "steps", "stone/granite", span((-recess, opening.left_m, max(low - 0.15, 0.0)), (0.3, opening.right_m, low + 0.02))
+            "steps",
+            "stone/granite",
+            span((-recess - 0.01, opening.left_m, max(low - 0.15, 0.0)), (0.3, opening.right_m, low + 0.02)),
         )
 
     def garage_door(self, opening: Opening, *, material: str = "coating/white") -> None:
@@ -329,7 +333,7 @@ class Facade:
             material,
             span((-recess - 0.02, opening.left_m, opening.bottom_m), (-recess, opening.right_m, opening.top_m)),
         )
-        panel = np.array([(a + 0.008, b - 0.008) for a, b in zip(levels[:-1], levels[1:], strict=True)])
+        panel = np.array([(a + 0.008, b - 0.008) for a, b in itertools.pairwise(levels)])
         ribs = [(a + (b - a) * k / 4 + 0.012, a + (b - a) * (k + 1) / 4 - 0.012) for a, b in panel for k in range(4)]
         low = [(-recess - 0.01, opening.left_m + 0.01, a) for a, _ in ribs]
         high = [(-recess + 0.02, opening.right_m - 0.01, b) for _, b in ribs]
@@ -338,7 +342,7 @@ class Facade:
     def shop(
         self, opening: Opening, *, material: str = "coating/green", door_at: float = 0.5, awning: str = "", sign_m: float = 0.62
     ) -> None:
-        """Draw a shop front: display windows on a low plinth, a glazed door set back, a fascia with a sign, perhaps an awning."""
+        """Draw a shop front: display windows on a plinth, a glazed door set back, a fascia with a sign, perhaps an awning."""
         recess, frame = 0.12, 0.06
         self.openings.append(opening)
         self.assembly.add("shop_fronts", material, reveal(opening, 0.9))
@@ -381,9 +385,7 @@ class Facade:
         count = max(round((right - left) / 1.5), 1)
         edges = np.linspace(left, right, count + 1)
         transom = high - 0.5
-        casements = [
-            (a, b, c, d) for a, b in zip(edges[:-1], edges[1:], strict=True) for c, d in ((low, transom), (transom, high))
-        ]
+        casements = [(a, b, c, d) for a, b in itertools.pairwise(edges) for c, d in ((low, transom), (transom, high))]
         self.assembly.add("shop_windows", "lamp/shop", self.glass(np.array(casements), -recess))
         bars = [(edge - frame / 2, edge + frame / 2, low, high) for edge in edges[1:-1]]
         bars += [(left, left + frame, low, high), (right - frame, right, low, high)]
@@ -406,9 +408,9 @@ class Facade:
         )
         self.assembly.add("shop_windows", "lamp/shop", self.glass(panes, -recess))
         bars = [
-            (left, left + 0.13, low, high),
-            (right - 0.13, right, low, high),
-            (left, right, low, low + 0.32),
+            (left, left + 0.13, low + 0.015, high),
+            (right - 0.13, right, low + 0.015, high),
+            (left, right, low + 0.015, low + 0.32),
             (left, right, head - 0.12, head + 0.06),
             (left, right, high - 0.06, high),
         ]
@@ -422,7 +424,9 @@ class Facade:
             "metal/brass",
             span((-recess + 0.05, right - 0.19, low + 0.8), (-recess + 0.075, right - 0.165, low + 1.4)),
         )
-        self.assembly.add("steps", "stone/granite", span((-0.9, left, max(low - 0.15, 0.0)), (0.1, right, low + 0.015)))
+        self.assembly.add(
+            "steps", "stone/granite", span((-0.895, left + 0.001, max(low - 0.15, 0.0)), (0.1, right - 0.001, low + 0.015))
+        )
 
     def lettering(self, centre: float, long: float, middle: float, tall: float, x: float) -> None:
         """Strokes that read as a line of letters from afar, without saying anything."""
@@ -524,8 +528,8 @@ class Facade:
                 [(out + 0.02, right + 0.02, high), (out - 0.19, left + 0.18, high), (out - 0.19, right + 0.02, high)],
             ),
             boxes(
-                [(0.0, left + 0.2, low - 0.45), (0.0, right - 0.45, low - 0.45)],
-                [(0.35, left + 0.45, low - 0.16), (0.35, right - 0.2, low - 0.16)],
+                [(-0.01, left + 0.21, low - 0.45), (-0.01, right - 0.45, low - 0.45)],
+                [(0.35, left + 0.45, low - 0.16), (0.35, right - 0.21, low - 0.16)],
             ),
         )
 
@@ -545,15 +549,13 @@ def _casements(opening: Opening, look: WindowLook) -> tuple[Array, Array]:
     left, right, low, high, frame = opening.left_m, opening.right_m, opening.bottom_m, opening.top_m, look.frame_m
     edges = np.linspace(left, right, look.columns + 1)
     levels = [low, high] if look.transom <= 0 else [low, low + look.transom * (high - low), high]
-    panes = [
-        (a, b, c, d) for a, b in zip(edges[:-1], edges[1:], strict=True) for c, d in zip(levels[:-1], levels[1:], strict=True)
-    ]
+    panes = [(a, b, c, d) for a, b in itertools.pairwise(edges) for c, d in itertools.pairwise(levels)]
     members = [(left, left + frame, low, high), (right - frame, right, low, high)]
     inner = (left + frame, right - frame)
     members += [(*inner, low, low + frame), (*inner, high - frame, high)]
     members += [(edge - 0.7 * frame, edge + 0.7 * frame, low + frame, high - frame) for edge in edges[1:-1]]
     members += [(*inner, level - 0.5 * frame, level + 0.5 * frame) for level in levels[1:-1]]
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in itertools.pairwise(edges):
         top = levels[1] if look.transom > 0 else high
         for k in range(look.bars):
             z = low + (top - low) * (k + 1) / (look.bars + 1)
@@ -572,7 +574,7 @@ def _frames(members: Array, x_m: float) -> Shape:
 def _soldier_course(left: float, right: float, low: float) -> Shape:
     count = max(round((right - left) / 0.075), 1)
     edges = np.linspace(left, right, count + 1)
-    low_corners = np.column_stack([np.full(count, -0.02), edges[:-1] + 0.005, np.full(count, low)])
+    low_corners = np.column_stack([np.full(count, 0.0), edges[:-1] + 0.005, np.full(count, low)])
     high_corners = np.column_stack([np.full(count, 0.012), edges[1:] - 0.005, np.full(count, low + 0.22)])
     return boxes(low_corners, high_corners)
 
@@ -580,15 +582,15 @@ def _soldier_course(left: float, right: float, low: float) -> Shape:
 def _pediment(left: float, right: float, low: float) -> list[Shape]:
     """Brackets, a shelf, and a flat gable above."""
     middle, rise = (left + right) / 2, 0.17 * (right - left)
-    shelf = span((-0.02, left, low + 0.1), (0.2, right, low + 0.19))
-    frieze = span((-0.02, left + 0.08, low), (0.06, right - 0.08, low + 0.1))
+    shelf = span((0.0, left, low + 0.1), (0.2, right, low + 0.19))
+    frieze = span((0.0, left + 0.08, low), (0.06, right - 0.08, low + 0.1))
     brackets = boxes(
-        [(-0.02, left + 0.04, low - 0.18), (-0.02, right - 0.16, low - 0.18)],
+        [(0.0, left + 0.04, low - 0.18), (0.0, right - 0.16, low - 0.18)],
         [(0.13, left + 0.16, low + 0.1), (0.13, right - 0.04, low + 0.1)],
     )
     base = low + 0.19
     outline = np.array([(0.16, left, base), (0.16, right, base), (0.16, middle, base + rise)])
-    back = outline - [0.18, 0, 0]
+    back = outline - [0.16, 0, 0]
     gable = loft(np.array([back, outline]))
     return [shelf, frieze, brackets, gable]
 
@@ -633,7 +635,7 @@ def _door_leaf(left: float, right: float, low: float, high: float, x_m: float) -
 def solid_spans(
     width_m: float, low_m: float, high_m: float, openings: Sequence[Opening], *, beyond_m: float = 0.0
 ) -> list[tuple[float, float]]:
-    """Return the stretches (left, right) of a band of wall that no opening touches; the ends reach `beyond_m` past the corners."""
+    """Return the stretches (left, right) of a band of wall that no opening touches; ends reach `beyond_m` past corners."""
     half = width_m / 2 + beyond_m
     cut = sorted((o.left_m, o.right_m) for o in openings if o.bottom_m < high_m - 1e-6 and o.top_m > low_m + 1e-6)
     spans, start = [], -half
@@ -649,12 +651,12 @@ def solid_spans(
 def courses(
     width_m: float, low_m: float, high_m: float, openings: Sequence[Opening], *, course_m: float, out_m: float, groove_m: float
 ) -> Shape:
-    """Return bands of stone laid over a wall between its openings, with grooves between them (rustication); one course is a plinth."""
+    """Return courses of stone over a wall between its openings, with grooves (rustication); one course is a plinth."""
     count = max(round((high_m - low_m) / course_m), 1)
     levels = np.linspace(low_m, high_m, count + 1)
     low, high = [], []
-    for a, b in zip(levels[:-1], levels[1:], strict=True):
+    for a, b in itertools.pairwise(levels):
         for left, right in solid_spans(width_m, a, b, openings, beyond_m=out_m):
-            low.append((-0.02, left, a + groove_m / 2))
+            low.append((0.0, left, a + groove_m / 2))
             high.append((out_m, right, b - groove_m / 2))
     return boxes(np.array(low).reshape(-1, 3), np.array(high).reshape(-1, 3))

@@ -8,6 +8,8 @@ posters of 1185 x 1750 mm and boards of 3.0 x 6.1 m (48 sheets); the kiosk has t
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -47,7 +49,9 @@ def litter_bin(rng: np.random.Generator, *, colour: str = "green") -> BuiltAsset
     assembly = Assembly()
     body = [(0.0, 0.04), (0.19, 0.04), (0.22, 0.08), (0.225, 0.78), (0.235, 0.79), (0.235, 0.82), (0.2, 0.82), (0.2, 0.2)]
     assembly.add("body", f"coating/{colour}", revolution(body, sides=32))
-    assembly.add("foot", "metal/cast_iron", revolution([(0.0, 0.0), (0.2, 0.0), (0.2, 0.03), (0.16, 0.05), (0.0, 0.05)], sides=24))
+    assembly.add(
+        "foot", "metal/cast_iron", revolution([(0.0, 0.0), (0.2, 0.0), (0.2, 0.03), (0.16, 0.05), (0.0, 0.05)], sides=24)
+    )
     for angle in np.deg2rad([45, 135, 225, 315]):
         x, y = 0.205 * np.cos(angle), 0.205 * np.sin(angle)
         assembly.add("body", f"coating/{colour}", tube([(x, y, 0.7), (x, y, 1.02)], 0.014, sides=8))
@@ -67,7 +71,12 @@ def _wrapped(flat: Shape, radius_m: float, z_m: float) -> Shape:
 
 
 def _wheel(assembly: Assembly, x_m: float, y_m: float, radius_m: float, wide_m: float) -> None:
-    profile = [(radius_m * 0.55, -wide_m / 2), (radius_m * 0.92, -wide_m / 2), (radius_m, -wide_m * 0.3), (radius_m, wide_m * 0.3)]
+    profile = [
+        (radius_m * 0.55, -wide_m / 2),
+        (radius_m * 0.92, -wide_m / 2),
+        (radius_m, -wide_m * 0.3),
+        (radius_m, wide_m * 0.3),
+    ]
     profile += [(radius_m * 0.92, wide_m / 2), (radius_m * 0.55, wide_m / 2)]
     tyre = revolution(profile, sides=24).turned("x", 90).moved(x_m, y_m, radius_m)
     assembly.add("wheels", "rubber/tyre", tyre)
@@ -78,21 +87,34 @@ def wheelie_bin(rng: np.random.Generator, *, colour: str = "black", lid: str = "
     """Return a two-wheeled bin of 240 l, its front towards +x and its handle behind."""
     assembly = Assembly()
     body, top = f"plastic/{colour}", f"plastic/{lid}"
-    levels = [(0.06, 0.48, 0.43, -0.06), (0.12, 0.5, 0.45, -0.05), (0.89, 0.6, 0.54, 0.0), (0.93, 0.64, 0.575, 0.0), (0.99, 0.64, 0.575, 0.0)]
+    levels = [
+        (0.06, 0.48, 0.43, -0.06),
+        (0.12, 0.5, 0.45, -0.05),
+        (0.89, 0.6, 0.54, 0.0),
+        (0.93, 0.64, 0.575, 0.0),
+        (0.99, 0.64, 0.575, 0.0),
+    ]
     rings = [_rounded(length, width, 0.05, shift, z) for z, length, width, shift in levels]
     assembly.add("body", body, loft(np.array(rings)).smooth(35.0))
     for z in (0.3, 0.5):
         assembly.add("body", body, span((0.0, -0.18, z), (0.262 + 0.05 * (z - 0.12), 0.18, z + 0.02)))
-    cover = [_rounded(0.66 - inset, 0.58 - inset, 0.05, 0.005, z) for z, inset in ((0.0, 0.0), (0.03, 0.0), (0.06, 0.04), (0.075, 0.16))]
+    cover = [
+        _rounded(0.66 - inset, 0.58 - inset, 0.05, 0.005, z)
+        for z, inset in ((0.0, 0.0), (0.03, 0.0), (0.06, 0.04), (0.075, 0.16))
+    ]
     hood = loft(np.array(cover)).smooth(50.0).moved(0.325)
     hood = hood.turned("y", -open_deg).moved(-0.325, 0.0, 0.997)
     assembly.add("lid", top, hood)
     assembly.add("handle", body, tube([(-0.385, -0.24, 0.98), (-0.385, 0.24, 0.98)], 0.014, sides=10))
-    assembly.add("handle", body, boxes([(-0.39, y - 0.02, 0.93) for y in (-0.22, 0.22)], [(-0.3, y + 0.02, 0.99) for y in (-0.22, 0.22)]))
+    assembly.add(
+        "handle", body, boxes([(-0.39, y - 0.02, 0.93) for y in (-0.22, 0.22)], [(-0.3, y + 0.02, 0.99) for y in (-0.22, 0.22)])
+    )
     assembly.add("axle", "metal/steel_galvanised", cylinder(0.012, 0.5, sides=8, axis="y").moved(-0.25, 0.0, 0.1))
     for y in (-0.255, 0.255):
         _wheel(assembly, -0.25, y, 0.1, 0.05)
-    assembly.add("feet", body, boxes([(0.06, y - 0.03, 0.0) for y in (-0.15, 0.15)], [(0.14, y + 0.03, 0.08) for y in (-0.15, 0.15)]))
+    assembly.add(
+        "feet", body, boxes([(0.06, y - 0.03, 0.0) for y in (-0.15, 0.15)], [(0.14, y + 0.03, 0.08) for y in (-0.15, 0.15)])
+    )
     number = str(int(rng.integers(2, 99)))
     assembly.add("label", "sign/white", text(number, 0.11, 0.0).turned("y", 4.0).moved(0.3105, 0.0, 0.68))
     return BuiltAsset("bin", ("wheelie", "refuse"), assembly.parts(paintable=("body", "lid")), {"volume_l": 240.0})
@@ -114,7 +136,7 @@ def container(rng: np.random.Generator, *, colour: str = "blue", lid: str = "blu
     body = f"plastic/{colour}"
     levels = [(0.2, 0.86, 1.08), (0.3, 0.9, 1.14), (1.0, 1.0, 1.28), (1.04, 1.06, 1.36), (1.12, 1.06, 1.36)]
     assembly.add("body", body, loft(np.array([_rounded(x, y, 0.07, 0.0, z) for z, x, y in levels])).smooth(35.0))
-    for y in np.linspace(-0.42, 0.42, 5):
+    for y in (-0.5, -0.36, 0.36, 0.5):
         assembly.add("body", body, _rib(float(y), 0.44, 0.5))
     turn = np.linspace(0.0, np.pi, 11)
     arch = np.column_stack([0.53 * np.cos(turn), 0.22 * np.sin(turn) + 1.125])
@@ -126,7 +148,14 @@ def container(rng: np.random.Generator, *, colour: str = "blue", lid: str = "blu
     for y in (-0.685, 0.685):
         bar = tube([(-0.25, y, 0.98), (0.25, y, 0.98)], 0.02, sides=10)
         assembly.add("handles", "metal/steel_galvanised", bar)
-        assembly.add("handles", "metal/steel_galvanised", boxes([(x - 0.02, min(y, 0.94 * y), 0.95) for x in (-0.25, 0.25)], [(x + 0.02, max(y, 0.94 * y), 1.01) for x in (-0.25, 0.25)]))
+        assembly.add(
+            "handles",
+            "metal/steel_galvanised",
+            boxes(
+                [(x - 0.02, min(y, 0.94 * y), 0.95) for x in (-0.25, 0.25)],
+                [(x + 0.02, max(y, 0.94 * y), 1.01) for x in (-0.25, 0.25)],
+            ),
+        )
     for x in (-0.34, 0.34):
         for y in (-0.45, 0.45):
             _wheel(assembly, x, y, 0.1, 0.045)
@@ -137,7 +166,14 @@ def container(rng: np.random.Generator, *, colour: str = "blue", lid: str = "blu
 
 
 def _rib(y: float, low_x: float, high_x: float) -> Shape:
-    low = np.array([(low_x - 0.02, y - 0.03, 0.32), (low_x + 0.02, y - 0.03, 0.32), (low_x + 0.02, y + 0.03, 0.32), (low_x - 0.02, y + 0.03, 0.32)])
+    low = np.array(
+        [
+            (low_x - 0.02, y - 0.03, 0.32),
+            (low_x + 0.02, y - 0.03, 0.32),
+            (low_x + 0.02, y + 0.03, 0.32),
+            (low_x - 0.02, y + 0.03, 0.32),
+        ]
+    )
     return loft(np.array([low, low + [high_x - low_x, 0.0, 0.66]]))
 
 
@@ -169,7 +205,11 @@ def bench(rng: np.random.Generator, *, style: str = "park") -> BuiltAsset:
         for k in range(6):
             x = -0.23 + 0.08 * k
             assembly.add("slats", "wood/pine", span((x, -0.9, 0.4), (x + 0.06, 0.9, 0.445)))
-        assembly.add("rail", "metal/steel_brushed", tube([(-0.22, 0.5, 0.42), (-0.25, 0.5, 0.72), (-0.25, 1.0, 0.72), (-0.22, 1.0, 0.38)], 0.02, sides=10))
+        assembly.add(
+            "rail",
+            "metal/steel_brushed",
+            tube([(-0.22, 0.5, 0.42), (-0.25, 0.5, 0.72), (-0.25, 1.0, 0.72), (-0.22, 1.0, 0.38)], 0.02, sides=10),
+        )
     return BuiltAsset("bench", ("seat", style), assembly.parts(paintable=("slats",)), {"seat_height_m": 0.45})
 
 
@@ -207,7 +247,14 @@ def slot_rack(rng: np.random.Generator, *, count: int = 6) -> BuiltAsset:
         y = (number - (count - 1) / 2) * 0.38
         lift = 0.0 if number % 2 else 0.16
         for side in (-0.03, 0.03):
-            path = [(0.22, 0.02), (0.2, 0.3 + lift), (0.1, 0.42 + lift), (-0.05, 0.42 + lift), (-0.18, 0.3 + lift / 2), (-0.22, 0.02)]
+            path = [
+                (0.22, 0.02),
+                (0.2, 0.3 + lift),
+                (0.1, 0.42 + lift),
+                (-0.05, 0.42 + lift),
+                (-0.18, 0.3 + lift / 2),
+                (-0.22, 0.02),
+            ]
             assembly.add("slots", "metal/steel_galvanised", tube([(x, y + side, z) for x, z in path], 0.009, sides=8))
     return BuiltAsset("bike_rack", ("slots",), assembly.parts(), {"places": float(count)})
 
@@ -215,7 +262,9 @@ def slot_rack(rng: np.random.Generator, *, count: int = 6) -> BuiltAsset:
 # -- bus stops ------------------------------------------------------------------------------------------------------------
 
 
-def _poster(assembly: Assembly, rng: np.random.Generator, low: tuple[float, float], high: tuple[float, float], x_m: float) -> None:
+def _poster(
+    assembly: Assembly, rng: np.random.Generator, low: tuple[float, float], high: tuple[float, float], x_m: float
+) -> None:
     """Paper on the plane x with shapes in four colours, as advertisements have."""
     wide, tall = high[0] - low[0], high[1] - low[1]
     centre = ((low[0] + high[0]) / 2, (low[1] + high[1]) / 2)
@@ -226,7 +275,9 @@ def _poster(assembly: Assembly, rng: np.random.Generator, low: tuple[float, floa
     assembly.add("poster", f"paper/poster_{colours[1]}", filled(band, x_m + FILM_M))
     size = 0.32 * min(wide, tall)
     at = (centre[0] + float(rng.uniform(-0.2, 0.2)) * wide, split + 0.52 * (high[1] - split))
-    outline = circle(size * 0.8, at) if rng.random() < 0.5 else polygon(6, size, turn_deg=float(rng.uniform(0, 60))) + np.array(at)
+    outline = (
+        circle(size * 0.8, at) if rng.random() < 0.5 else polygon(6, size, turn_deg=float(rng.uniform(0, 60))) + np.array(at)
+    )
     assembly.add("poster", f"paper/poster_{colours[2]}", filled(outline, x_m + FILM_M))
     assembly.add("poster", "paper/white", filled(circle(size * 0.42, at), x_m + 2 * FILM_M))
     words = ("SUMMER", "NEW", "MUSIC", "FRESH", "TRAVEL", "OPEN")
@@ -243,24 +294,51 @@ def bus_shelter(rng: np.random.Generator) -> BuiltAsset:
     back = -deep / 2
     for y in np.linspace(-wide / 2, wide / 2, 4):
         assembly.add("frame", frame, span((back, y - 0.04, 0.0), (back + 0.08, y + 0.04, high)))
-    assembly.add("frame", frame, *(span((deep / 2 - 0.3, y - 0.04, 0.0), (deep / 2 - 0.22, y + 0.04, high)) for y in (-wide / 2, wide / 2)))
+    assembly.add(
+        "frame",
+        frame,
+        *(span((deep / 2 - 0.3, y - 0.04, 0.0), (deep / 2 - 0.22, y + 0.04, high)) for y in (-wide / 2, wide / 2)),
+    )
     assembly.add("frame", frame, span((back, -wide / 2 - 0.04, high), (deep / 2, wide / 2 + 0.04, high + 0.08)))
-    assembly.add("roof", "coating/white", span((back - 0.05, -wide / 2 - 0.1, high + 0.08), (deep / 2 + 0.15, wide / 2 + 0.1, high + 0.14)))
-    assembly.add("fascia", "coating/blue", span((deep / 2 + 0.15, -wide / 2 - 0.1, high + 0.02), (deep / 2 + 0.18, wide / 2 + 0.1, high + 0.18)))
-    assembly.add("fascia_letters", "sign/white", text("CENTRAL STATION", 0.1, deep / 2 + 0.18 + FILM_M, centre_m=(0.0, high + 0.1)))
+    assembly.add(
+        "roof",
+        "coating/white",
+        span((back - 0.05, -wide / 2 - 0.1, high + 0.08), (deep / 2 + 0.15, wide / 2 + 0.1, high + 0.14)),
+    )
+    assembly.add(
+        "fascia",
+        "coating/blue",
+        span((deep / 2 + 0.15, -wide / 2 - 0.1, high + 0.02), (deep / 2 + 0.18, wide / 2 + 0.1, high + 0.18)),
+    )
+    assembly.add(
+        "fascia_letters", "sign/white", text("CENTRAL STATION", 0.1, deep / 2 + 0.18 + FILM_M, centre_m=(0.0, high + 0.1))
+    )
     edges = np.linspace(-wide / 2, wide / 2, 4)
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in itertools.pairwise(edges):
         assembly.add("glass", "glass/clear", span((back + 0.035, a + 0.06, 0.25), (back + 0.045, b - 0.06, high - 0.1)))
         assembly.add("frame", frame, span((back + 0.02, a + 0.04, 0.2), (back + 0.06, b - 0.04, 0.24)))
-    assembly.add("glass", "glass/clear", span((back + 0.12, wide / 2 - 0.005, 0.25), (deep / 2 - 0.34, wide / 2 + 0.005, high - 0.1)))
+    assembly.add(
+        "glass", "glass/clear", span((back + 0.12, wide / 2 - 0.005, 0.25), (deep / 2 - 0.34, wide / 2 + 0.005, high - 0.1))
+    )
     _case(assembly, rng, y_m=-wide / 2 + 0.1, x_m=0.0)
-    seat = [span((back + 0.32, -0.9, 0.46 + 0.0), (back + 0.42, 1.6, 0.49)), span((back + 0.44, -0.9, 0.46), (back + 0.54, 1.6, 0.49))]
+    seat = [
+        span((back + 0.32, -0.9, 0.46 + 0.0), (back + 0.42, 1.6, 0.49)),
+        span((back + 0.44, -0.9, 0.46), (back + 0.54, 1.6, 0.49)),
+    ]
     assembly.add("seat", "wood/oak", *seat)
     for y in (-0.6, 1.3):
-        assembly.add("seat_legs", frame, span((back + 0.08, y - 0.03, 0.4), (back + 0.54, y + 0.03, 0.46)), span((back + 0.4, y - 0.03, 0.0), (back + 0.46, y + 0.03, 0.4)))
+        assembly.add(
+            "seat_legs",
+            frame,
+            span((back + 0.08, y - 0.03, 0.4), (back + 0.54, y + 0.03, 0.46)),
+            span((back + 0.4, y - 0.03, 0.0), (back + 0.46, y + 0.03, 0.4)),
+        )
     table = (back + 0.05 + 2 * FILM_M, 0.4)
     assembly.add("timetable", "paper/white", span((back + 0.047, 0.1, 1.2), (table[0], 0.75, 1.75)))
-    lines = [ribbon([(0.16, 1.7 - 0.045 * k), (0.16 + float(rng.uniform(0.2, 0.52)), 1.7 - 0.045 * k)], 0.014, table[0] + FILM_M) for k in range(10)]
+    lines = [
+        ribbon([(0.16, 1.7 - 0.045 * k), (0.16 + float(rng.uniform(0.2, 0.52)), 1.7 - 0.045 * k)], 0.014, table[0] + FILM_M)
+        for k in range(10)
+    ]
     assembly.add("timetable_lines", "sign/black", *lines)
     assembly.add("base", "concrete/grey", span((back - 0.05, -wide / 2 - 0.1, 0.0), (deep / 2 + 0.1, wide / 2 + 0.1, 0.02)))
     return BuiltAsset("bus_stop", ("shelter", "glass"), assembly.parts(paintable=("frame", "fascia")), {"opening": "+x"})
@@ -284,10 +362,18 @@ def bus_pole(rng: np.random.Generator) -> BuiltAsset:
     post(assembly, 2.62)
     assembly.add("plate", "metal/aluminium", span((-0.0042, -0.2, 1.95), (-0.0012, 0.2, 2.18)))
     assembly.add("lines", "sign/white", filled(rectangle(0.4, 0.23, (0.0, 2.065)), 0.0))
-    assembly.add("lines_text", "sign/black", text("12 N4", 0.09, 0.0012, centre_m=(0.0, 2.11)), text("CENTRE", 0.05, 0.0012, centre_m=(0.0, 2.0)))
+    assembly.add(
+        "lines_text",
+        "sign/black",
+        text("12 N4", 0.09, 0.0012, centre_m=(0.0, 2.11)),
+        text("CENTRE", 0.05, 0.0012, centre_m=(0.0, 2.0)),
+    )
     assembly.add("case", "coating/grey", span((-0.05, -0.17, 1.1), (0.0, 0.17, 1.6)))
     assembly.add("timetable", "paper/white", filled(rectangle(0.3, 0.46, (0.0, 1.35)), FILM_M))
-    lines = [ribbon([(-0.12, 1.53 - 0.035 * k), (-0.12 + float(rng.uniform(0.1, 0.24)), 1.53 - 0.035 * k)], 0.01, 2 * FILM_M) for k in range(11)]
+    lines = [
+        ribbon([(-0.12, 1.53 - 0.035 * k), (-0.12 + float(rng.uniform(0.1, 0.24)), 1.53 - 0.035 * k)], 0.01, 2 * FILM_M)
+        for k in range(11)
+    ]
     assembly.add("timetable_lines", "sign/black", *lines)
     return BuiltAsset("bus_stop", ("pole",), assembly.parts(), {"opening": "+x"})
 
@@ -306,16 +392,21 @@ def phone_box(rng: np.random.Generator, *, colour: str = "red") -> BuiltAsset:
     for turn in (0.0, 90.0, 180.0, -90.0):
         side = Assembly()
         inner = half - post_w
-        side.add("body", paint, span((-0.07, -inner, 0.1), (-0.02, inner, 0.42)), span((-0.08, -inner, 1.86), (-0.01, inner, 2.1)))
+        side.add(
+            "body", paint, span((-0.07, -inner, 0.1), (-0.02, inner, 0.42)), span((-0.08, -inner, 1.86), (-0.01, inner, 2.1))
+        )
         if turn != 180.0:
             bars = [(0.0, y - 0.012, y + 0.012, 0.42, 1.86) for y in (-inner + 0.08, inner - 0.08)]
             bars += [(0.0, -inner, inner, z - 0.012, z + 0.012) for z in np.linspace(0.42, 1.86, 9)]
             side.add(
                 "body",
                 paint,
-                boxes([(-0.06, a, c) for _, a, _, c, _ in bars], [(-0.025 - 0.004 * (b - a > 0.1), b, d) for _, a, b, c, d in bars]),
+                boxes(
+                    [(-0.06, a, c) for _, a, _, c, _ in bars],
+                    [(-0.025 - 0.004 * (b - a > 0.1), b, d) for _, a, b, c, d in bars],
+                ),
             )
-            side.add("glass", "glass/clear", span((-0.053, -inner, 0.42), (-0.047, inner, 1.86)))
+            side.add("glass", "glass/clear", span((-0.053, -inner + 0.002, 0.422), (-0.047, inner - 0.002, 1.858)))
         else:
             side.add("body", paint, span((-0.07, -inner, 0.42), (-0.02, inner, 1.86)))
         x = -0.01 + FILM_M
@@ -327,7 +418,8 @@ def phone_box(rng: np.random.Generator, *, colour: str = "red") -> BuiltAsset:
     assembly.add("body", paint, loft(np.array(rings)))
     dome = np.linspace(0.0, np.pi / 2, 6)
     rings = [
-        _rounded(2 * (0.43 * np.cos(0.8 * a)), 2 * (0.43 * np.cos(0.8 * a)), 0.06, 0.0, 2.22 + 0.2 * np.sin(a)).tolist() for a in dome
+        _rounded(2 * (0.43 * np.cos(0.8 * a)), 2 * (0.43 * np.cos(0.8 * a)), 0.06, 0.0, 2.22 + 0.2 * np.sin(a)).tolist()
+        for a in dome
     ]
     assembly.add("roof", paint, loft(np.array(rings)).smooth(40.0))
     assembly.add("telephone", "plastic/black", span((-half + 0.08, -0.16, 1.0), (-half + 0.2, 0.16, 1.55)))
@@ -347,7 +439,11 @@ def emergency_pillar(rng: np.random.Generator) -> BuiltAsset:
     assembly.add("foot", "concrete/grey", span((-0.24, -0.22, 0.0), (0.24, 0.22, 0.05)))
     front = 0.17
     assembly.add("panel", "metal/steel_brushed", span((front - 0.01, -0.1, 0.85), (front + 0.008, 0.1, 1.25)))
-    holes = [filled(circle(0.006, (0.02 * a - 0.05, 1.2 - 0.02 * b), sides=8), front + 0.008 + FILM_M) for a in range(6) for b in range(4)]
+    holes = [
+        filled(circle(0.006, (0.02 * a - 0.05, 1.2 - 0.02 * b), sides=8), front + 0.008 + FILM_M)
+        for a in range(6)
+        for b in range(4)
+    ]
     assembly.add("grille", "plastic/black", *holes)
     assembly.add("button", "plastic/red", cylinder(0.03, 0.02, sides=20, axis="x").moved(front + 0.018, 0.0, 1.0))
     assembly.add("letters", "sign/white", text("SOS", 0.13, front + FILM_M, centre_m=(0.0, 0.6)))
@@ -378,13 +474,26 @@ def billboard(rng: np.random.Generator, *, width_m: float = 6.1, height_m: float
         brace = tube([(-1.2, y, 0.05), (-0.3, y, low + 0.4)], 0.05, sides=10)
         assembly.add("columns", "coating/grey", brace, span((-1.35, y - 0.15, 0.0), (-1.05, y + 0.15, 0.08)))
         assembly.add("footings", "concrete/grey", span((-0.55, y - 0.3, 0.0), (0.05, y + 0.3, 0.12)))
-    for y in np.linspace(-half * 0.75, half * 0.75, 4):
-        y = float(y)
-        assembly.add("lamp_arms", "coating/grey", tube([(-0.02, y, high + 0.08), (0.5, y, high + 0.4), (0.95, y, high + 0.36)], 0.018, sides=8))
+    for y in np.linspace(-half * 0.75, half * 0.75, 4).tolist():
+        assembly.add(
+            "lamp_arms",
+            "coating/grey",
+            tube([(-0.02, y, high + 0.08), (0.5, y, high + 0.4), (0.95, y, high + 0.36)], 0.018, sides=8),
+        )
         assembly.add("lamp_houses", "coating/grey", span((0.85, y - 0.2, high + 0.33), (1.1, y + 0.2, high + 0.39)))
-        face = [(0.87, y - 0.18, high + 0.326), (0.87, y + 0.18, high + 0.326), (1.08, y + 0.18, high + 0.326), (1.08, y - 0.18, high + 0.326)]
+        face = [
+            (0.87, y - 0.18, high + 0.326),
+            (0.87, y + 0.18, high + 0.326),
+            (1.08, y + 0.18, high + 0.326),
+            (1.08, y - 0.18, high + 0.326),
+        ]
         assembly.add("lamp", "lamp/street_led", quads([face]))
-    return BuiltAsset("billboard", ("board", "lit"), assembly.parts(paintable=("frame",)), {"poster_width_m": width_m, "poster_height_m": height_m})
+    return BuiltAsset(
+        "billboard",
+        ("board", "lit"),
+        assembly.parts(paintable=("frame",)),
+        {"poster_width_m": width_m, "poster_height_m": height_m},
+    )
 
 
 def poster_case(rng: np.random.Generator) -> BuiltAsset:
@@ -398,13 +507,24 @@ def poster_case(rng: np.random.Generator) -> BuiltAsset:
         paper = Assembly()
         _poster(paper, rng, (-0.5925, low + 0.12), (0.5925, low + 0.12 + 1.75), FILM_M)
         assembly.place(paper, turn_deg=turn, x_m=sign * 0.1)
-    return BuiltAsset("billboard", ("poster", "city_light"), assembly.parts(paintable=("case",)), {"poster_width_m": 1.185, "poster_height_m": 1.75})
+    return BuiltAsset(
+        "billboard",
+        ("poster", "city_light"),
+        assembly.parts(paintable=("case",)),
+        {"poster_width_m": 1.185, "poster_height_m": 1.75},
+    )
 
 
 FURNITURE: tuple[StarterEntry, ...] = (
     StarterEntry("bin-litter", "Litter bin with hood", litter_bin, {}, 201),
     StarterEntry("bin-wheelie-240", "Wheeled bin, 240 l", wheelie_bin, {}, 202),
-    StarterEntry("bin-wheelie-240-yellow", "Wheeled bin, 240 l, yellow lid ajar", wheelie_bin, {"colour": "grey", "lid": "yellow", "open_deg": 9.0}, 203),
+    StarterEntry(
+        "bin-wheelie-240-yellow",
+        "Wheeled bin, 240 l, yellow lid ajar",
+        wheelie_bin,
+        {"colour": "grey", "lid": "yellow", "open_deg": 9.0},
+        203,
+    ),
     StarterEntry("bin-container-1100", "Recycling container, 1100 l", container, {}, 204),
     StarterEntry("bench-park", "Park bench, oak and cast iron", bench, {"style": "park"}, 211),
     StarterEntry("bench-modern", "Bench, concrete with slats", bench, {"style": "modern"}, 212),

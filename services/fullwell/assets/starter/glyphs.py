@@ -23,19 +23,19 @@ Points = Sequence[tuple[float, float]]
 def circle(radius_m: float, centre_m: tuple[float, float] = (0.0, 0.0), *, sides: int = 40) -> Array:
     """(n, 2) points of a circle, counter-clockwise."""
     angle = np.arange(sides) * (2 * np.pi / sides)
-    return np.column_stack([np.cos(angle), np.sin(angle)]) * radius_m + np.array(centre_m)
+    return np.asarray(np.column_stack([np.cos(angle), np.sin(angle)]) * radius_m + np.array(centre_m))
 
 
 def polygon(corners: int, radius_m: float, *, turn_deg: float = 0.0) -> Array:
     """(n, 2) corners of a regular polygon; the first at `turn_deg` from +y."""
     angle = np.arange(corners) * (2 * np.pi / corners) + np.deg2rad(turn_deg)
-    return np.column_stack([np.cos(angle), np.sin(angle)]) * radius_m
+    return np.asarray(np.column_stack([np.cos(angle), np.sin(angle)]) * radius_m)
 
 
 def rectangle(width_m: float, height_m: float, centre_m: tuple[float, float] = (0.0, 0.0)) -> Array:
     """(4, 2) corners, counter-clockwise."""
     half = np.array([width_m, height_m]) / 2
-    return np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * half + np.array(centre_m)
+    return np.asarray(np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * half + np.array(centre_m))
 
 
 def rounded(corners_m: ArrayLike, radius_m: float, *, steps: int = 4) -> Array:
@@ -88,8 +88,10 @@ def ribbon(path_m: ArrayLike, width_m: float, x_m: float) -> Shape:
     return quads(np.stack([np.column_stack([np.full(len(loop), x_m), loop]) for loop in loops], axis=1))
 
 
-def arrow(length_m: float, width_m: float, x_m: float, *, turn_deg: float = 0.0, centre_m: tuple[float, float] = (0.0, 0.0)) -> Shape:
-    """Return an arrow that points up, or `turn_deg` counter-clockwise from it as the reader sees it; `width_m` is the shaft's."""
+def arrow(
+    length_m: float, width_m: float, x_m: float, *, turn_deg: float = 0.0, centre_m: tuple[float, float] = (0.0, 0.0)
+) -> Shape:
+    """Return an arrow that points up, or `turn_deg` counter-clockwise from it to the reader; `width_m` is the shaft's."""
     half, head = length_m / 2, 1.5 * width_m
     shaft = np.array([(-width_m / 2, -half), (width_m / 2, -half), (width_m / 2, half - head), (-width_m / 2, half - head)])
     tip = np.array([(-1.5 * width_m, half - head), (1.5 * width_m, half - head), (0.0, half)])
@@ -136,7 +138,9 @@ def text(words: str, height_m: float, x_m: float, *, centre_m: tuple[float, floa
     return joined(shapes)
 
 
-def _arc(centre: tuple[float, float], radius: tuple[float, float], start_deg: float, stop_deg: float) -> list[tuple[float, float]]:
+def _arc(
+    centre: tuple[float, float], radius: tuple[float, float], start_deg: float, stop_deg: float
+) -> list[tuple[float, float]]:
     angle = np.deg2rad(np.linspace(start_deg, stop_deg, max(int(abs(stop_deg - start_deg) / 22.5) + 1, 3)))
     return [(centre[0] + radius[0] * float(np.cos(a)), centre[1] + radius[1] * float(np.sin(a))) for a in angle]
 

@@ -49,7 +49,11 @@ def _led_head(length_m: float = 0.62) -> Assembly:
         head.add("housing", "coating/grey", span((0.16, y - 0.004, 0.08), (length_m - 0.12, y + 0.004, 0.105)))
     inner_x, inner_y = (0.17, length_m - 0.09), wide / 2 - 0.03
     rim = boxes(
-        [(inner_x[0] - 0.015, -inner_y - 0.015, -0.016), (inner_x[0] - 0.015, inner_y, -0.016), (inner_x[0] - 0.015, -inner_y, -0.016)]
+        [
+            (inner_x[0] - 0.015, -inner_y - 0.015, -0.016),
+            (inner_x[0] - 0.015, inner_y, -0.016),
+            (inner_x[0] - 0.015, -inner_y, -0.016),
+        ]
         + [(inner_x[1], -inner_y, -0.016)],
         [(inner_x[1] + 0.015, -inner_y, 0.01), (inner_x[1] + 0.015, inner_y + 0.015, 0.01), (inner_x[0], inner_y, 0.01)]
         + [(inner_x[1] + 0.015, inner_y, 0.01)],
@@ -147,7 +151,9 @@ def _tilted(head: Assembly, tilt_deg: float) -> Assembly:
     return raised
 
 
-def lantern(rng: np.random.Generator, *, height_m: float = 4.0, lamp: str = "lamp/street_mh", flux_lm: float = 6000.0) -> BuiltAsset:
+def lantern(
+    rng: np.random.Generator, *, height_m: float = 4.0, lamp: str = "lamp/street_mh", flux_lm: float = 6000.0
+) -> BuiltAsset:
     """Return a cast-iron column with ladder bar and a six-sided lantern; the lamp hangs below its roof."""
     iron = "coating/black"
     assembly = Assembly()
@@ -185,25 +191,39 @@ def _lantern_cage(assembly: Assembly, base: float, iron: str) -> None:
         assembly.add("cage", iron, tube([(*(0.13 * start), low), (*(0.13 * stop), low)], 0.011, sides=6))
         assembly.add("cage", iron, tube([(*(0.235 * start), high), (*(0.235 * stop), high)], 0.016, sides=6))
         assembly.add("cage", iron, tube([(0.0, 0.0, base - 0.02), (*(0.13 * start), low)], 0.009, sides=6))
-    roof = [(0.0, high - 0.005), (0.25, high - 0.005), (0.255, high + 0.015), (0.11, high + 0.2), (0.1, high + 0.2), (0.1, high + 0.27)]
+    roof = [
+        (0.0, high - 0.005),
+        (0.25, high - 0.005),
+        (0.255, high + 0.015),
+        (0.11, high + 0.2),
+        (0.1, high + 0.2),
+        (0.1, high + 0.27),
+    ]
     roof += [(0.12, high + 0.28), (0.03, high + 0.34), (0.02, high + 0.38), (0.0, high + 0.4)]
     assembly.add("roof", iron, revolution(roof, sides=6).flat())
 
 
-def bracket_light(rng: np.random.Generator, *, height_m: float = 7.6, lamp: str = "lamp/street_hps", flux_lm: float = 10000.0) -> BuiltAsset:
+def bracket_light(
+    rng: np.random.Generator, *, height_m: float = 7.6, lamp: str = "lamp/street_hps", flux_lm: float = 10000.0
+) -> BuiltAsset:
     """Return a timber pole with a bracket arm, a stay, and a lamp house; insulators and a cable down the pole."""
     assembly = Assembly()
     lean = rng.uniform(-0.03, 0.03, 2)
-    path = [(0.0, 0.0, 0.0), (lean[0] / 2, lean[1] / 2, height_m / 2), (lean[0], lean[1], height_m)]
-    assembly.add("pole", "wood/weathered", tube(path, np.array([0.13, 0.115, 0.095]), sides=16))
+    # Upright at the foot, so that its end lies flat on the ground.
+    path = [(0.0, 0.0, 0.0), (0.0, 0.0, 0.6), (lean[0] / 2, lean[1] / 2, height_m / 2), (lean[0], lean[1], height_m)]
+    assembly.add("pole", "wood/weathered", tube(path, np.array([0.13, 0.128, 0.115, 0.095]), sides=16))
     arm_z = height_m - 1.3
     assembly.add("arm", _GALVANISED, tube([(0.05, 0, arm_z), (0.9, 0, arm_z + 0.3), (1.5, 0, arm_z + 0.36)], 0.028, sides=12))
     assembly.add("arm", _GALVANISED, tube([(0.05, 0, arm_z - 0.6), (0.8, 0, arm_z + 0.26)], 0.012, sides=8))
-    assembly.add("clamps", _GALVANISED, *(cylinder(0.118, 0.05, sides=16).moved(lean[0], lean[1], z) for z in (arm_z, arm_z - 0.6)))
+    assembly.add(
+        "clamps", _GALVANISED, *(cylinder(0.118, 0.05, sides=16).moved(lean[0], lean[1], z) for z in (arm_z, arm_z - 0.6))
+    )
     assembly.place(_tilted(_cobra_head(lamp), 4.0), x_m=1.46, z_m=arm_z + 0.33)
     cross = height_m - 0.45
     assembly.add("crossarm", "wood/weathered", box((0.09, 1.3, 0.11), centre_m=(0.13, 0.0, cross)))
-    pin = revolution([(0.0, 0.0), (0.02, 0.0), (0.02, 0.06), (0.05, 0.07), (0.045, 0.1), (0.03, 0.12), (0.04, 0.14), (0.0, 0.16)], sides=14)
+    pin = revolution(
+        [(0.0, 0.0), (0.02, 0.0), (0.02, 0.06), (0.05, 0.07), (0.045, 0.1), (0.03, 0.12), (0.04, 0.14), (0.0, 0.16)], sides=14
+    )
     for y in (-0.55, -0.2, 0.2, 0.55):
         assembly.add("insulators", "stone/limestone", pin.moved(0.13, y, cross + 0.055))
     assembly.add("cable", "plastic/black", tube([(0.0, 0.125, 0.3), (0.0, 0.11, arm_z - 0.1)], 0.014, sides=8))
@@ -226,7 +246,9 @@ def _visor(radius_m: float, depth_m: float, x_m: float, z_m: float) -> Shape:
         return np.column_stack([x_m + out, radius * circle_[:, 0], z_m + radius * circle_[:, 1]])
 
     zero = np.zeros(len(angle))
-    rings = np.array([curve(radius_m + 0.004, zero), curve(radius_m + 0.004, reach), curve(radius_m, reach), curve(radius_m, zero)])
+    rings = np.array(
+        [curve(radius_m + 0.004, zero), curve(radius_m + 0.004, reach), curve(radius_m, reach), curve(radius_m, zero)]
+    )
     grid = np.swapaxes(rings, 0, 1)
     faces = np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=2).reshape(-1, 4, 3)
     return quads(faces[:, ::-1]).smooth(40.0)
@@ -252,7 +274,10 @@ def _signal_head(colours: tuple[str, ...], diameter_m: float, *, board: bool) ->
         head.add("board", "plastic/black", span((-0.05, low[0], low[1]), (-0.045, high[0], high[1])))
         edge = 0.04
         strips = [(low[0], high[0], low[1], low[1] + edge), (low[0], high[0], high[1] - edge, high[1])]
-        strips += [(low[0], low[0] + edge, low[1] + edge, high[1] - edge), (high[0] - edge, high[0], low[1] + edge, high[1] - edge)]
+        strips += [
+            (low[0], low[0] + edge, low[1] + edge, high[1] - edge),
+            (high[0] - edge, high[0], low[1] + edge, high[1] - edge),
+        ]
         x = -0.043
         head.add("board_edge", "sign/white", quads([[(x, a, c), (x, b, c), (x, b, d), (x, a, d)] for a, b, c, d in strips]))
     return head
@@ -317,7 +342,11 @@ def pedestrian_signal(rng: np.random.Generator) -> BuiltAsset:
     for colour, z in (("red", low + 1.5 * cell), ("green", low + 0.5 * cell)):
         assembly.add(f"light_{colour}", _LAMPS[colour], walker(0.19, x + 0.003, standing=colour == "red", centre_m=(0.0, z)))
         assembly.add("visors", "plastic/black", _visor(0.125, 0.17, x, z))
-    assembly.add("brackets", _GALVANISED, boxes([(0.0, -0.03, 2.3), (0.0, -0.03, 2.66)], [(x - 0.15, 0.03, 2.36), (x - 0.15, 0.03, 2.72)]))
+    assembly.add(
+        "brackets",
+        _GALVANISED,
+        boxes([(0.0, -0.03, 2.3), (0.0, -0.03, 2.66)], [(x - 0.15, 0.03, 2.36), (x - 0.15, 0.03, 2.72)]),
+    )
     assembly.add("button_box", "plastic/yellow", span((radius - 0.005, -0.045, 0.98), (radius + 0.06, 0.045, 1.16)))
     assembly.add("button", "plastic/black", cylinder(0.024, 0.02, sides=16, axis="x").moved(radius + 0.066, 0.0, 1.05))
     assembly.add("button_label", "sign/white", span((radius + 0.05, -0.035, 1.09), (radius + 0.0625, 0.035, 1.145)))
@@ -326,19 +355,32 @@ def pedestrian_signal(rng: np.random.Generator) -> BuiltAsset:
 
 LIGHTS: tuple[StarterEntry, ...] = (
     StarterEntry(
-        "street-light-led-8", "Street light, 8 m, one arm, LED", column_light, {"height_m": 8.0, "reach_m": 1.2, "tags": ("led",)}, 131
+        "street-light-led-8",
+        "Street light, 8 m, one arm, LED",
+        column_light,
+        {"height_m": 8.0, "reach_m": 1.2, "tags": ("led",)},
+        131,
     ),
     StarterEntry(
         "street-light-hps-10",
         "Street light, 10 m, two arms, high-pressure sodium",
         column_light,
-        {"height_m": 10.0, "reach_m": 1.8, "lamp": "lamp/street_hps", "arms": 2, "flux_lm": 16000.0, "tags": ("sodium", "double")},
+        {
+            "height_m": 10.0,
+            "reach_m": 1.8,
+            "lamp": "lamp/street_hps",
+            "arms": 2,
+            "flux_lm": 16000.0,
+            "tags": ("sodium", "double"),
+        },
         132,
     ),
     StarterEntry("street-light-lantern-4", "Lantern on a cast column, 4 m, metal halide", lantern, {}, 133),
     StarterEntry("street-light-bracket", "Timber pole with bracket lamp, sodium", bracket_light, {}, 134),
     StarterEntry("traffic-light-post", "Traffic light on a post, three aspects", vehicle_signal, {}, 141),
-    StarterEntry("traffic-light-overhead", "Traffic light with an arm over the carriageway", vehicle_signal, {"arm_m": 5.5}, 142),
+    StarterEntry(
+        "traffic-light-overhead", "Traffic light with an arm over the carriageway", vehicle_signal, {"arm_m": 5.5}, 142
+    ),
     StarterEntry("traffic-light-pedestrian", "Pedestrian signal with push button", pedestrian_signal, {}, 143),
 )
 """All street lights and traffic lights of the starter library."""

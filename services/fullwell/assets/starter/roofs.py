@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,7 +60,7 @@ def laid_tiles(corners_m: ArrayLike, covering: Covering, rng: np.random.Generato
     start = (column + 0.5 * (row % 2)) * covering.width_m
     lift = covering.thickness_m + rng.uniform(0.0, covering.uneven_m, (len(start), 2))
 
-    def place(u: Array, v: Array, height: Array) -> Array:
+    def place(u: NDArray[Any], v: NDArray[Any], height: NDArray[Any]) -> Array:
         left, right = left_top * v / slope, eave + (right_top - eave) * v / slope
         inside = np.clip(u, left, right)
         return np.asarray(corner[0] + inside[:, None] * along + v[:, None] * upward + height[:, None] * normal)
@@ -115,7 +116,7 @@ def gable_roof(
     verge_m: float = 0.25,
     to_street: bool = False,
 ) -> float:
-    """Draw a gable roof, the ridge parallel to the street or, `to_street`, at right angles to it; return the ridge height [m]."""
+    """Draw a gable roof, its ridge along the street or, `to_street`, at right angles to it; return the ridge's height [m]."""
     across, along = (width_m, depth_m) if to_street else (depth_m, width_m)
     tangent = float(np.tan(np.deg2rad(pitch_deg)))
     ridge = eaves_m + across / 2 * tangent
@@ -297,7 +298,7 @@ def flat_roof(
     plant: int = 3,
     stair: bool = True,
 ) -> float:
-    """Draw a gravelled roof behind a parapet, with plant boxes, vents and the head of the stairs; return the greatest height [m]."""
+    """Draw a gravelled roof behind a parapet, with plant, vents and the head of the stairs; return the greatest height [m]."""
     thick = 0.3
     x, y = depth_m / 2, width_m / 2
     crown = top_m + parapet_m
@@ -312,7 +313,8 @@ def flat_roof(
         (-thick - 0.05, crown),
     ]
     assembly.add("coping", coping_material, moulding(width_m, depth_m, coping))
-    assembly.add("roof", "concrete/grey", quad([(x, -y, top_m), (x, y, top_m), (-x, y, top_m), (-x, -y, top_m)]))
+    ix, iy = x - 0.8 * thick, y - 0.8 * thick
+    assembly.add("roof", "concrete/grey", quad([(ix, -iy, top_m), (ix, iy, top_m), (-ix, iy, top_m), (-ix, -iy, top_m)]))
     highest = crown + 0.07
     free_x, free_y = x - 1.2, y - 1.2
     if stair and free_x > 2 and free_y > 2:
@@ -335,7 +337,7 @@ def flat_roof(
     for _ in range(plant):
         highest = max(highest, _plant_box(assembly, free_x, free_y, top_m, rng))
     for _ in range(3):
-        px, py = float(rng.uniform(-free_x, free_x)), float(rng.uniform(-free_y, free_y))
+        px, py = float(rng.uniform(0.2, 1.0)) * free_x, float(rng.uniform(-free_y, free_y))
         assembly.add(
             "vents",
             "metal/steel_galvanised",
@@ -354,7 +356,7 @@ def _plant_box(assembly: Assembly, free_x: float, free_y: float, low_m: float, r
         np.array([x - size[0] / 2, y - size[1] / 2, low_m + 0.2]),
         np.array([x + size[0] / 2, y + size[1] / 2, low_m + 0.2 + size[2]]),
     )
-    assembly.add("plant", "metal/steel_galvanised", span(low, high))
+    assembly.add("plant", "metal/steel_galvanised", boxes(low, high))
     count = 8
     levels = np.linspace(low[2] + 0.15, high[2] - 0.15, count)
     assembly.add(
@@ -413,15 +415,14 @@ class Dormer:
 
 def dormer(
     assembly: Assembly,
-    x_m: float,
-    y_m: float,
-    sill_m: float,
     style: Dormer,
+    *,
+    at_m: tuple[float, float, float],
     look: WindowLook,
     panes: PaneLots,
     rng: np.random.Generator,
 ) -> None:
-    """Draw a dormer whose face stands at x, looking along +x; its back runs into the slope."""
+    """Draw a dormer whose sill is at (x, y, z), looking along +x; its back runs into the slope."""
     wide, tall, deep = style.width_m + 0.3, style.height_m + 0.15, style.depth_m
     face = Facade(wide, look, panes, rng, "dormers", style.face_material)
     face.window(Opening(-style.width_m / 2, style.width_m / 2, 0.08, 0.08 + style.height_m), look, sill=False)
@@ -447,4 +448,4 @@ def dormer(
     else:
         lid = span((-deep, -half - out, tall), (out, half + out, tall + 0.12))
         face.assembly.add("dormer_tops", "roof/metal", lid)
-    assembly.place(face.assembly, x_m=x_m, y_m=y_m, z_m=sill_m)
+    assembly.place(face.assembly, x_m=at_m[0], y_m=at_m[1], z_m=at_m[2])

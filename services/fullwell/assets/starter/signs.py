@@ -51,7 +51,7 @@ def _stop() -> _Plate:
     radius = 0.375 / np.cos(np.pi / 8)
     plate = _Plate(polygon(8, radius, turn_deg=22.5), "white")
     plate.film(1, "red", filled(polygon(8, radius * 0.945, turn_deg=22.5), 0.0))
-    plate.film(2, "white", text("STOP", 0.25, 0.0, weight=0.17))
+    plate.film(2, "white", text("STOP", 0.19, 0.0, weight=0.17))
     return plate
 
 
@@ -204,7 +204,10 @@ def direction_board(
     row = 0.42
     height = row * len(lines) + 0.12
     plate = _Plate(rounded(rectangle(width_m, height), 0.08), colour)
-    outer, inner = rounded(rectangle(width_m - 0.05, height - 0.05), 0.07), rounded(rectangle(width_m - 0.1, height - 0.1), 0.05)
+    outer, inner = (
+        rounded(rectangle(width_m - 0.05, height - 0.05), 0.07),
+        rounded(rectangle(width_m - 0.1, height - 0.1), 0.05),
+    )
     plate.film(1, "white", ring(outer, inner, 0.0))
     for number, (place, turn) in enumerate(lines):
         z = height / 2 - 0.06 - row * (number + 0.5)
