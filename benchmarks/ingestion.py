@@ -16,12 +16,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.mutations import KINDS, MutationGround
 from benchmarks.results import DOCS, fill_page, markdown_table
 from fullwell.assets import packaged_model, packaged_model_names
-from fullwell.assets.ingest import IngestError, IngestLimits, IngestOptions, IngestProcess
-from fullwell.assets.model import ModelError
+from fullwell.assets.ingest import IngestError, IngestLimits, IngestOptions, IngestProcess, prepare_file, read_level
+from fullwell.assets.model import LoadedModel, LoadedPart, ModelError
 from fullwell.assets.records import PreparedAsset
 
 __all__ = ["SAMPLES", "Outcome", "Sample", "damaged_outcomes", "make_samples", "packaged_samples", "shared_samples"]
@@ -92,6 +96,63 @@ def _time_table(samples: list[Sample]) -> str:
             found = ", ".join(f"{states[state]} {state}" for state in ("mended", "warning", "decide") if states[state])
             rows.append([sample.name, manifest.asset_class, f"{seconds:.2f}", size, levels, error, found])
     return markdown_table(["model", "class", "time [s]", "size [m]", "triangles", "error [m]", "checks"], rows)
+
+
+# Figure --------------------------------------------------------------------------------------------------------------
+
+
+def _figure(folder: Path, file: Path) -> None:
+    """Draw what became of a few samples: finest level above, coarser below, all in the pose of the store."""
+    import matplotlib as mpl  # noqa: PLC0415
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt  # noqa: PLC0415
+
+    wanted = (
+        "vehicle-motorcycle",
+        "sedanFullAsset",
+        "ambulanceFullAsset",
+        "building-small-c",
+        "humanResting",
+        "car-normal-citrus",
+    )
+    samples = [s for s in shared_samples(folder) + packaged_samples() if s.name in wanted]
+    figure, axes = plt.subplots(2, len(samples), figsize=(3 * len(samples), 5.6), subplot_kw={"projection": "3d"})
+    for column, sample in enumerate(samples):
+        prepared = prepare_file(sample.folder, sample.main, sample.options, isolated=True)
+        levels = prepared.manifest.levels
+        for row, level in enumerate((levels[0], levels[-1])):
+            axis = axes[row][column]
+            _draw(axis, read_level(prepared.blobs[level.sha256]))
+            axis.set_title(f"{sample.name}\n{level.triangles} triangles, {100 * level.error_m:.1f} cm", fontsize=9)
+    figure.tight_layout()
+    figure.savefig(file, dpi=80)
+
+
+def _draw(axis: Any, model: LoadedModel) -> None:
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # noqa: PLC0415
+
+    triangles = np.concatenate([part.vertices_m[part.faces] for part in model.parts])
+    colours = np.concatenate([_face_colours(part) for part in model.parts])
+    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    shade = 0.55 + 0.45 * np.clip(np.abs(normal @ np.array([0.6, 0.3, 0.75])), 0, 1)
+    axis.add_collection3d(Poly3DCollection(triangles, facecolors=np.clip(colours * shade[:, None], 0, 1)))
+    half = float((model.bounds_m[1] - model.bounds_m[0]).max()) / 2
+    middle = model.bounds_m.mean(axis=0)
+    for name, centre in zip("xyz", middle, strict=True):
+        getattr(axis, f"set_{name}lim")(centre - 0.72 * half, centre + 0.72 * half)
+    axis.set_box_aspect((1, 1, 1))
+    axis.view_init(elev=22, azim=-38)
+    axis.set_axis_off()
+
+
+def _face_colours(part: LoadedPart) -> NDArray[np.float64]:
+    if part.base_color_texture is None or part.uv is None:
+        return np.tile(part.base_color_srgb, (len(part.faces), 1))
+    rows, cols = part.base_color_texture.shape[:2]
+    u, v = part.uv[part.faces].mean(axis=1).T
+    return part.base_color_texture[((1 - v) * rows).astype(int) % rows, (u * cols).astype(int) % cols] / 255.0
 
 
 # Damaged files -------------------------------------------------------------------------------------------------------
@@ -195,6 +256,7 @@ def main() -> None:
     note = f"The slowest took {slowest:.1f} s." if outcomes else ""
     print(f"{table}\n\n{note}")
     if options.write:
+        _figure(options.samples, PAGE.parent / "images" / "ingestion_levels.png")
         fill_page(PAGE, "times", times)
         if outcomes:
             fill_page(PAGE, "outcomes", f"{table}\n\n{note}")
