@@ -260,7 +260,7 @@ def _refuse_unreadable(database: Database) -> None:
         .where(event.kind.in_(VERSION_KINDS), row.key.is_(None))
     )
     with database.reading() as session:
-        found = session.execute(missing).tuples().all()
+        found = session.execute(missing).all()
         standings = {
             asset_id: standing_of(files) for asset_id, files in files_of(session, sorted({name for name, _ in found})).items()
         }
@@ -279,7 +279,7 @@ def _retired_versions(database: Database, pinned: set[str], *, before: float) ->
     with database.reading() as session:
         recent = select(event.asset_id).where(event.kind == "retired", event.at > before)
         chosen = select(row.asset_id, row.version, row.digest).where(row.retired.is_(True), row.asset_id.not_in(recent))
-        found = [_Retired(*values) for values in session.execute(chosen.order_by(row.asset_id, row.version)).tuples()]
+        found = [_Retired(*values) for values in session.execute(chosen.order_by(row.asset_id, row.version))]
     return [version for version in found if version.digest not in pinned]
 
 
@@ -296,7 +296,7 @@ def _mark_collected(store: ObjectStore, database: Database, chosen: Sequence[_Re
             held = select(AssetHoldRow.digest).where(AssetHoldRow.digest.in_(digests), AssetHoldRow.until >= now)
             row = AssetVersionRow
             retired = select(row.asset_id, row.version).where(row.retired.is_(True), row.digest.in_(digests))
-            still = set(session.execute(retired.where(row.digest.not_in(held))).tuples())
+            still = {(asset_id, number) for asset_id, number in session.execute(retired.where(row.digest.not_in(held)))}
             going = [version for version in batch if (version.asset_id, version.version) in still]
             files = _collected_events(session, going, now)
             for file in files:

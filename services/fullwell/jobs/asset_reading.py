@@ -76,7 +76,7 @@ def manifests_of(store: ObjectStore, files: Iterable[AssetFile], *, passing_over
 def absorb(store: ObjectStore, database: Database, *, passing_over: bool) -> int:
     """Index files of the store that the tables do not know, such as a crash leaves; return how many there were."""
     with database.reading() as session:
-        known = set(session.execute(select(AssetEventRow.asset_id, AssetEventRow.version, AssetEventRow.name)).tuples())
+        known = session.execute(select(AssetEventRow.asset_id, AssetEventRow.version, AssetEventRow.name)).all()
     names = {(asset_id, name) for asset_id, _, name in known}
     versions = {(asset_id, version) for asset_id, version, name in known if name.partition("-")[2].startswith("v")}
     unknown = []
