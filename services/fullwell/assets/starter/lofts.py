@@ -1,9 +1,9 @@
 """Half shells of vehicles, and panels cut out of them along fields.
 
 A vehicle's skin is lofted from plan rings (superellipses, as long and wide as its profiles say) and closed by a crowned top.
-Only the left half (y >= 0) is made; the right is its mirror image. Windows, lamps, seams and wheel arches are then cut out along
-the zero lines of fields on its vertices: cuts are exact between vertices, and normals come from the uncut skin, so that no cut
-shows in the shading.
+Only the left half (y >= 0) is made; the right is its mirror image. Windows, lamps, seams and wheel arches are then cut out
+along the zero lines of fields on its vertices: cuts are exact between vertices, and normals come from the uncut skin, so that
+no cut shows in the shading.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ __all__ = [
     "both_sides",
     "boundary_edges",
     "half_shell",
+    "inset",
     "intersection",
     "opposite",
     "outline_walls",
@@ -193,7 +194,7 @@ def half_shell(spec: ShellSpec) -> tuple[Patch, Patch]:
     widths = spec.half_width_m - rings[:, 1:2]
     y = widths * unit[None, :, 1]
     level = np.repeat(rings[:, :1], len(unit), axis=1)
-    # The top: from the last ring to a spine in the middle plane, which stops short of both ends, for slivers' sake.
+    # The top: from the last ring to a spine in the middle plane that stops short of both ends, against slivers.
     inward = np.linspace(0.0, 1.0, spec.across + 1)[1:, None]
     short = min(0.8 * float(widths[-1, 0]), 0.4 * float(x[-1].max() - x[-1].min()))
     spine = np.clip(x[-1:], x[-1].min() + short, x[-1].max() - short)
@@ -224,7 +225,7 @@ def half_shell(spec: ShellSpec) -> tuple[Patch, Patch]:
 
 
 def _unit_ring(spec: ShellSpec) -> tuple[Array, Array]:
-    """Return (columns, 2) points of the unit superellipse, front to rear by the left, even along the widest ring; and the way."""
+    """Return (columns, 2) points of the unit superellipse, front to rear by the left, and the way along the widest."""
     angle = np.linspace(0.0, np.pi, 2001)
     cosine, sine = np.cos(angle), np.sin(angle)
     power = np.where(cosine > 0, spec.front_power, spec.rear_power)
@@ -537,6 +538,11 @@ def beyond(axis: str, at_m: float) -> Field:
     """Return the region where x, y or z is more than a value."""
     index = "xyz".index(axis)
     return lambda patch: np.asarray(at_m - patch.vertices_m[:, index])
+
+
+def inset(field_: Field, by_m: float) -> Field:
+    """Return a region smaller by a margin."""
+    return lambda patch: field_(patch) + by_m
 
 
 def opposite(field_: Field) -> Field:

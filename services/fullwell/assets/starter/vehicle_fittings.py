@@ -9,7 +9,17 @@ from numpy.typing import ArrayLike
 
 from fullwell.assets.starter.shapes import Shape, box, joined, loft, quad, tube
 
-__all__ = ["door_handle", "mirror", "number_plate", "plate_text", "rounded_box", "wiper"]
+__all__ = [
+    "door_handle",
+    "lamp_lens",
+    "mirror",
+    "number_plate",
+    "plate_text",
+    "round_lens",
+    "rounded_box",
+    "segment_text",
+    "wiper",
+]
 
 
 def rounded_box(
@@ -82,19 +92,45 @@ def plate_text(rng: np.random.Generator, *, height_m: float = 0.075) -> Shape:
     letters = "ACEFHJLPU"
     text = "".join(rng.choice(list(letters), 2)) + " " + "".join(rng.choice(list(letters), 2)) + " "
     text += "".join(str(digit) for digit in rng.integers(0, 10, 3))
+    return segment_text(text, height_m).moved(0.0045)
+
+
+def segment_text(text: str, height_m: float) -> Shape:
+    """Return characters made of straight strokes (digits and ACEFHJLPU) facing +x in the plane x = 0, centred."""
     cell, stroke = height_m / 2 * 0.86, height_m * 0.13
-    pitch = cell + 0.022
+    pitch = cell + 0.3 * height_m
     bars = []
     for place, character in enumerate(text):
-        left = (place - len(text) / 2) * pitch + 0.011  # seen from the front, +y is on the right
+        left = (place - len(text) / 2) * pitch + 0.15 * height_m  # seen from the front, +y is on the right
         for segment in _CHARACTERS.get(character, ""):
             x0, y0, x1, y1 = _SEGMENTS[segment]
             wide = abs(x1 - x0) * cell + stroke
             tall = abs(y1 - y0) * (height_m - stroke) / 2 + stroke
             y = left + (x0 + x1) / 2 * cell
             z = (y0 + y1 - 2) / 2 * (height_m - stroke) / 2
-            bars.append(_upright(0.0045, y, z, wide, tall))
+            bars.append(_upright(0.0, y, z, wide, tall))
     return joined(bars)
+
+
+def lamp_lens(width_m: float, height_m: float, *, depth_m: float = 0.015) -> Shape:
+    """Return a lamp's cover facing +x, rounded, its foot at x = 0; open behind, so that a lit one shines forward only."""
+    return _dome(width_m, height_m, depth_m, 6.0)
+
+
+def round_lens(radius_m: float, *, depth_m: float = 0.015) -> Shape:
+    """Return a round lamp's cover facing +x, its foot at x = 0; open behind."""
+    return _dome(2 * radius_m, 2 * radius_m, depth_m, 2.0)
+
+
+def _dome(width_m: float, height_m: float, depth_m: float, power: float) -> Shape:
+    angle = np.linspace(0.0, 2 * np.pi, 24, endpoint=False)
+    c, s = np.cos(angle), np.sin(angle)
+    radius = (np.abs(c) ** power + np.abs(s) ** power) ** (-1 / power)
+    rings = [
+        np.stack([np.full(24, out * depth_m), share * width_m / 2 * radius * c, share * height_m / 2 * radius * s], axis=-1)
+        for out, share in ((0.0, 1.0), (0.5, 0.99), (0.8, 0.92), (0.95, 0.7), (1.0, 0.35), (1.0, 0.001))
+    ]
+    return loft(rings, caps=False).smooth(50)
 
 
 def _upright(x: float, y: float, z: float, wide: float, tall: float) -> Shape:
