@@ -513,7 +513,15 @@ TREES: Final = (
         "pine-01", "Scots pine", 331, pine, species="pine", height_m=14.0, crown_radius_m=3.2, trunk_radius_m=0.19, bare_m=6.0
     ),
     _entry(
-        "spruce-01", "Spruce", 341, spruce, species="spruce", height_m=14.5, crown_radius_m=2.7, trunk_radius_m=0.18, bare_m=0.7
+        "spruce-01",
+        "Spruce",
+        341,
+        spruce,
+        species="spruce",
+        height_m=14.5,
+        crown_radius_m=2.7,
+        trunk_radius_m=0.18,
+        bare_m=0.95,
     ),
     _entry(
         "spruce-02",

@@ -34,7 +34,7 @@ CLOSED = ("skin", "top", "trousers", "shorts", "skirt", "tights", "vest", "hair"
 BODIES = [
     entry
     for entry in LIVING
-    if entry.id.startswith(("woman", "man", "elderly", "girl", "boy", "toddler", "teen", "deer", "dog", "rock"))
+    if entry.id.startswith(("woman", "man", "elderly", "girl", "boy", "toddler", "teen", "cyclist", "deer", "dog", "rock"))
 ]
 
 
@@ -142,7 +142,16 @@ def test_another_seed_gives_another_individual(entry_id: str) -> None:
 def test_the_library_has_the_kinds_that_streets_need() -> None:
     assert len(set(ids(LIVING))) == len(LIVING)
     classes = [built(entry.id).asset_class for entry in LIVING]
-    for kind, least in (("pedestrian", 14), ("deer", 2), ("dog", 2), ("tree", 9), ("bush", 4), ("grass", 3), ("rock", 2)):
+    for kind, least in (
+        ("pedestrian", 14),
+        ("cyclist", 3),
+        ("deer", 2),
+        ("dog", 2),
+        ("tree", 9),
+        ("bush", 4),
+        ("grass", 3),
+        ("rock", 2),
+    ):
         assert classes.count(kind) >= least
     children = [entry for entry in LIVING if "child" in built(entry.id).tags]
     assert len(children) >= 3
