@@ -11,7 +11,7 @@ from typing import Final, Literal
 
 from fullwell.core.errors import unknown_name_message
 from fullwell.core.hashing import sha256_hex
-from fullwell.traffic.sumo import SumoLimits, TrafficError, run_sumo_program
+from fullwell.traffic.sumo import SumoLimits, TrafficError, run_sumo_program, sumo_home
 from fullwell.traffic.templates import TEMPLATE_NAMES, CrossSection, template
 
 __all__ = ["GENERATED_NAMES", "NetworkFile", "NetworkSpec", "make_network"]
@@ -191,6 +191,8 @@ def _from_file(file: Path, folder: Path, path: str, limits: SumoLimits | None) -
     else:
         read = ["--opendrive-files", given.name, "--opendrive.curve-resolution", "1", "--opendrive.import-all-lanes", "true"]
         read += ["--opendrive.ignore-widths", "false", "--crossings.guess", "true"]
+        # Who may use a lane follows from its type.
+        read += ["--type-files", str(sumo_home() / "data" / "typemap" / "opendriveNetconvertPedestrians.typ.xml")]
     common = list(_COMMON) if kind != "sumo" else ["--precision", "3"]
     arguments = [*read, "--output-file", "out.net.xml", *common]
     return run_sumo_program("netconvert", arguments, folder=folder, path=f"{path}.file", what=repr(file.name), limits=limits)

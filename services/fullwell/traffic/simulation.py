@@ -269,21 +269,27 @@ def _trips(
             )
         chosen = [model for model in models if model.kind == kind and model.weight > 0]
         weights = np.array([model.weight for model in chosen]) / sum(model.weight for model in chosen)
-        rng = stream(seed, "traffic", kind)
         choice = _EndChoice(network, edges, walks=kind == "pedestrian")
         lanes_km = sum(lane.length_m for lane in edges.values()) / 1000.0
-        there = int(rng.poisson(density * lanes_km)) if density > 0 else 0
-        for number, depart_s in enumerate([0.0] * there + _arrivals(rng, rate, end_s)):
+        there = int(stream(seed, "traffic", kind, "there").poisson(density * lanes_km)) if density > 0 else 0
+        arrivals = _arrivals(stream(seed, "traffic", kind, "arrivals"), rate, end_s)
+        departures = [(f"{kind}{number}", 0.0, True) for number in range(there)]
+        departures += [(f"{kind}n{number}", depart_s, False) for number, depart_s in enumerate(arrivals)]
+        for name, depart_s, spread in departures:
+            # Of its own: one more trip, or a longer run, changes none of the others.
+            rng = stream(seed, "trip", name)
             model = chosen[int(rng.choice(len(chosen), p=weights))]
-            start = number < there
-            yield depart_s, f"{kind}{number}", _trip(rng, f"{kind}{number}", model, choice, depart_s=depart_s, spread=start)
+            yield depart_s, name, _trip(rng, name, model, choice, depart_s=depart_s, spread=spread)
 
 
 def _arrivals(rng: np.random.Generator, rate_per_s: float, end_s: float) -> list[float]:
-    if rate_per_s <= 0:
-        return []
-    count = int(rng.poisson(rate_per_s * end_s))
-    return sorted(float(time) for time in rng.uniform(0.0, end_s, min(count, 2 * _MOST_TRIPS)))
+    """Return the times of a Poisson process, one after the other: those of a longer run begin with those of a shorter."""
+    times: list[float] = []
+    time_s = float(rng.exponential(1.0 / rate_per_s)) if rate_per_s > 0 else math.inf
+    while time_s < end_s and len(times) < 2 * _MOST_TRIPS:
+        times.append(time_s)
+        time_s += float(rng.exponential(1.0 / rate_per_s))
+    return times
 
 
 def _usable_edges(network: RoadNetwork, kind: TrafficKind) -> dict[str, Lane]:
