@@ -1,4 +1,4 @@
-"""Figures for Prometheus: requests, jobs and frames by state, workers. An autoscaler reads queued + running frames here."""
+"""Figures for Prometheus: requests, jobs, frames and ingestions by state, workers. An autoscaler reads frames here."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from prometheus_client.registry import Collector
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from fullwell.core import FullwellError
+from fullwell.jobs.ingestions import IngestionState
 from fullwell.jobs.states import FrameState, JobState
 from fullwell_api.services import Services
 
@@ -30,6 +31,7 @@ class _JobCollector(Collector):
         repository = self._services.repository
         try:
             job_totals, frame_totals = repository.job_totals(), repository.frame_totals()
+            ingestion_totals = self._services.ingestions.totals()
             workers = self._services.live_workers()
         except FullwellError:
             yield GaugeMetricFamily("fullwell_database_up", "Whether the database answers", value=0)
@@ -43,6 +45,10 @@ class _JobCollector(Collector):
         for frame_state in FrameState:
             frames.add_metric([frame_state.value], frame_totals.get(frame_state, 0))
         yield frames
+        ingestions = GaugeMetricFamily("fullwell_ingestions", "Work on assets by state", labels=["state"])
+        for ingestion_state in IngestionState:
+            ingestions.add_metric([ingestion_state.value], ingestion_totals.get(ingestion_state, 0))
+        yield ingestions
         yield GaugeMetricFamily("fullwell_workers", "Workers with a recent sign of life", value=workers)
         yield GaugeMetricFamily(
             "fullwell_dispatcher_silence_seconds",

@@ -69,6 +69,8 @@ FOREVER: Final = "public, max-age=31536000, immutable"
 URL_LIFE_S: Final = 3600
 GARBAGE_AGE_S: Final = 86400.0
 MAX_FORM_FILES: Final = 2000
+UPLOAD_PRIORITY: Final = 0
+"""Before all frames: somebody waits for it, and it takes seconds."""
 
 AssetId = Annotated[str, PathParameter(min_length=1, max_length=80)]
 VersionNumber = Annotated[int, PathParameter(ge=1, le=99_999_999)]
@@ -152,7 +154,7 @@ def queue_import(parts: Services, wanted: AssetRequest, who: str, idempotency_ke
     check_blobs(parts, wanted.files)
     text = wanted.to_json()
     record, _ = parts.ingestions.create(
-        NewIngestion("upload", wanted.main, who, text, digest_of([text]), idempotency_key=idempotency_key)
+        NewIngestion("upload", wanted.main, who, text, digest_of([text]), UPLOAD_PRIORITY, idempotency_key)
     )
     parts.dispatcher.wake()
     return ingestion_out(record)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
+    from fullwell.assets.records import PreparedAsset
     from fullwell.cli.asset_store import LocalAssets
     from fullwell.client import Asset, FullwellClient
 
@@ -38,18 +41,29 @@ def bring_starter(store: FullwellClient | LocalAssets, bars: Any, *, only: str, 
 
 
 def _generate(store: LocalAssets, bars: Any, *, only: str, packaged: bool, approve: bool) -> list[Asset]:
-    from fullwell.assets.starter.library import prepare_starter, starter_entries
-
-    entries = [
-        entry for entry in starter_entries(packaged=packaged) if entry.id.startswith(only) or entry.asset_class.startswith(only)
-    ]
-    total = bars.add_task("starter library", total=len(entries))
+    makers = {name: make for name, make in _makers(packaged=packaged).items() if only in name}
+    total = bars.add_task("starter library", total=len(makers))
     made: list[Asset] = []
-    for entry in entries:
-        bars.update(total, description=entry.id)
-        asset, is_new = store.add(prepare_starter(entry), who=WHO)
-        if approve and asset.state == "pending" and (is_new or asset.document["created_by"] == WHO):
+    for name, make in makers.items():
+        bars.update(total, description=name)
+        asset, _ = store.add(make(), who=WHO)
+        # A decision that a person has made about it stays.
+        if approve and asset.state == "pending" and not asset.document["reviewed_by"]:
             asset = store.review("approved", ids=[asset.id], reason=REASON, who=WHO)[0]
         made.append(asset)
         bars.advance(total)
     return made
+
+
+def _makers(*, packaged: bool) -> dict[str, Callable[[], PreparedAsset]]:
+    """Return {id: what prepares that asset}."""
+    from fullwell.assets.starter.library import packaged_assets, packaged_ids, prepare_starter, starter_entries
+
+    makers: dict[str, Callable[[], PreparedAsset]] = {entry.id: partial(prepare_starter, entry) for entry in starter_entries()}
+    if packaged:
+        makers |= {name: partial(_only_one, packaged_assets, name) for name in packaged_ids()}
+    return makers
+
+
+def _only_one(prepare: Callable[[list[str]], Iterator[PreparedAsset]], name: str) -> PreparedAsset:
+    return next(prepare([name]))

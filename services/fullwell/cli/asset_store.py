@@ -64,6 +64,8 @@ class AssetStore(Protocol):
         self, changes: Mapping[str, Any], *, ids: Iterable[str] = (), query: Mapping[str, Any] | None = None
     ) -> tuple[Asset, ...]: ...
 
+    def retire(self, asset_id: str, *, reason: str = "") -> Asset: ...
+
     def export(self, target: Path | str, *, ids: Iterable[str] = (), query: Mapping[str, Any] | None = None) -> None: ...
 
     def import_archive(self, archive: Path | str, *, trust_states: bool = False) -> tuple[Asset, ...]: ...
@@ -227,6 +229,10 @@ class LocalAssets:
 
         entries = edit_assets(self.library, ids, edit_from(changes), who=WHO, expected_version=version)
         return tuple(self._plain(entry) for entry in entries)
+
+    def retire(self, asset_id: str, *, reason: str = "") -> Asset:
+        """Take an asset out of the catalogue."""
+        return self._plain(self.library.retire(asset_id, who=WHO, reason=reason))
 
     def collect_garbage(self, *, dry_run: bool = True) -> dict[str, Any]:
         """Remove what nothing refers to."""

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, cast
 
 import typer
 
-from fullwell.core.errors import FullwellError
+from fullwell.core.errors import FieldError, FullwellError
 
 if TYPE_CHECKING:
     from fullwell.cli.asset_store import AssetStore, Described, LocalAssets
@@ -53,7 +53,14 @@ def register(app: typer.Typer) -> None:
     """Add `fullwell assets` to `app`."""
     commands: dict[str, Any] = {"import": import_models, "list": list_assets, "search": search, "show": show}
     commands["approve"] = approve
-    commands |= {"reject": reject, "edit": edit, "export": export, "import-archive": import_archive, "gc": collect_garbage}
+    commands |= {
+        "reject": reject,
+        "edit": edit,
+        "retire": retire,
+        "export": export,
+        "import-archive": import_archive,
+        "gc": collect_garbage,
+    }
     commands |= {"reindex": reindex, "previews": previews, "starter": starter}
     for name, command in commands.items():
         assets_app.command(name)(command)
@@ -437,6 +444,21 @@ def edit(
         _print_assets(list(changed))
 
 
+def retire(
+    ids: Annotated[list[str], typer.Argument(help="Asset ids.", metavar="ID...")],
+    reason: ReasonOption = "",
+    as_json: JsonOption = False,
+    server: ServerOption = "",
+) -> None:
+    """Take assets out of the catalogue: found and drawn no more, until they are imported again. What they made stays."""
+    with _opened(server) as store:
+        gone = [_of(store).retire(asset_id, reason=reason) for asset_id in ids]
+    if as_json:
+        print(json.dumps({"items": [dict(asset.document) for asset in gone]}, indent=2))
+    else:
+        print(f"{', '.join(asset.id for asset in gone)} retired")
+
+
 # -- archives and upkeep ----------------------------------------------------------------------------------------------
 
 
@@ -538,7 +560,7 @@ def previews(
 def starter(
     packaged: Annotated[bool, typer.Option("--packaged", help="The models of the installed SUMO package too.")] = False,
     approved: Annotated[bool, typer.Option("--approve", help="Approve what comes in.")] = False,
-    only: Annotated[str, typer.Option("--only", help="Only entries whose id or class begins like this.")] = "",
+    only: Annotated[str, typer.Option("--only", help="Only entries with this in their id.")] = "",
     with_previews: Annotated[bool, typer.Option("--previews/--no-previews", help="Render pictures.")] = True,
     as_json: JsonOption = False,
     server: ServerOption = "",
@@ -546,10 +568,10 @@ def starter(
     """Take in the starter library: models that this program generates. What is here already stays as it is."""
     from fullwell.cli.asset_starter import bring_starter
 
-    with _opened(server) as store, _bars(quiet=as_json) as bars:
-        came = bring_starter(store, bars, only=only, packaged=packaged, approve=approved)
-    if with_previews and not _is_remote(store):
-        with _opened(server) as store:
+    with _opened(server) as store:
+        with _bars(quiet=as_json) as bars:
+            came = bring_starter(store, bars, only=only, packaged=packaged, approve=approved)
+        if with_previews and not _is_remote(store):
             _render_here(cast("LocalAssets", store), [_Row(Path(asset.id), asset) for asset in came], quiet=as_json)
     if as_json:
         print(json.dumps({"items": [dict(asset.document) for asset in came]}, indent=2))
@@ -715,7 +737,9 @@ def _print_asset(asset: Asset) -> None:
     console.print(f"[bold]{escape(asset.title or asset.id)}[/]  {asset.id} version {asset.version}  [{style}]{asset.state}[/]")
     if document["reviewed_by"]:
         why = f": {document['reason']}" if document["reason"] else ""
-        console.print(f"  by {escape(document['reviewed_by'])} on {document['reviewed_at'][:16]}{escape(why)}")
+        console.print(
+            f"  by {escape(document['reviewed_by'])} on {document['reviewed_at'][:16].replace('T', ' ')}{escape(why)}"
+        )
     size = " x ".join(f"{extent:.3f}" for extent in asset.size_m)
     source, terms = manifest["source"], document["licence"]
     console.print(f"  class      {asset.asset_class}; tags {escape(', '.join(asset.tags) or 'none')}")

@@ -320,6 +320,11 @@ class AssetClient:
         body = json.dumps(_selection(ids, query) | {"changes": dict(changes)})
         return _assets_from(self._transport.json("PATCH", "/v1/assets", content=body, headers=JSON))
 
+    def retire(self, asset_id: str, *, reason: str = "") -> Asset:
+        """Take an asset out of the catalogue: it is found and drawn no more; what was made with it stays."""
+        path = f"/v1/assets/{_step(asset_id)}"
+        return asset_from(self._transport.json("DELETE", path, params={"reason": reason}))
+
     def render_previews(self, asset_id: str) -> Ingestion:
         """Have an asset's previews rendered again."""
         return ingestion_from(self._transport.json("POST", f"/v1/assets/{_step(asset_id)}/previews", safe_again=False))

@@ -48,6 +48,14 @@ def fleet(command: Command, tmp_path: Path) -> Command:
     return command
 
 
+def test_the_starter_library_is_generated_approved_and_brought_once(command: Command) -> None:
+    words = ("starter", "--only", "bench-modern", "--approve", "--no-previews")
+    first, again = (command.data(*words)["items"] for _ in range(2))
+    assert [(item["id"], item["state"], item["reviewed_by"]) for item in first] == [("bench-modern", "approved", "starter")]
+    assert again == first
+    assert command.data("list", "--state", "approved")["items"] == first
+
+
 def test_an_empty_store_says_what_to_do(command: Command) -> None:
     assert "fullwell assets import" in command("list")
     assert command.data("list") == {"items": [], "more": False}
@@ -146,6 +154,12 @@ def test_an_archive_moves_a_collection_to_another_home(fleet: Command, tmp_path:
     assert [(item["id"], item["state"]) for item in fleet.data("list")["items"]] == [("car-0", "approved")]
     archive.write_bytes(archive.read_bytes()[:-100])
     fleet("import-archive", archive, code=1)
+
+
+def test_a_retired_asset_is_listed_no_more(fleet: Command) -> None:
+    assert "car-0 retired" in fleet("retire", "car-0", "--reason", "twice here")
+    assert [item["id"] for item in fleet.data("list")["items"]] == ["car-1"]
+    assert fleet.data("show", "car-0")["events"][0]["detail"] == "twice here"
 
 
 def test_upkeep_reports_what_it_did(fleet: Command) -> None:
