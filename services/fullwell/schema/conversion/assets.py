@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from fullwell.assets.records import AssetManifest, PartRecord
     from fullwell.schema.v1.geometry import AssetGeometry
 
-__all__ = ["DrawnAsset", "asset_part_material", "catalogue_material", "check_lit", "draw_asset", "is_catalogue_name"]
+__all__ = ["DrawnAsset", "asset_part_material", "catalogue_material", "check_lit", "draw_asset", "is_catalogue_name", "lamp_of"]
 
 _SMALLEST_ROUGHNESS = 0.01
 
@@ -138,6 +138,16 @@ def catalogue_material(name: str, path: str, context: Context, *, lit: bool = Fa
             emission = Emission(radiance, entry.lamp.group)
         context.materials[key] = (_surface(entry), emission)
     return context.materials[key]
+
+
+def lamp_of(name: str) -> Spectrum:
+    """Return the relative spectrum of a lamp of the catalogue."""
+    from fullwell.assets.materials.catalogue import asset_material  # noqa: PLC0415
+
+    lamp = asset_material(name).lamp
+    if lamp is None:
+        raise TypeError(f"the catalogue's material {name!r} is no lamp")
+    return lamp.spd
 
 
 def _surface(entry: SpectralMaterial) -> Material:

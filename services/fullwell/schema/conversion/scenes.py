@@ -61,12 +61,13 @@ def scene_of(document: SceneDocument, context: Context, viewpoints: Sequence[Vie
         objects.append(_object(item, document.materials, path, context))
         paths.append(path)
         inside_ok.append(item.inside_ok)
-    if document.traffic is not None and context.street is not None:
-        for of_street in street_objects(document.traffic, context.street, viewpoints, context):
-            objects.append(of_street)
-            paths.append("scene.traffic")
-            inside_ok.append(True)
     lights: list[Light] = []
+    if document.traffic is not None and context.street is not None:
+        of_street, beams = street_objects(document.traffic, context.street, viewpoints, context)
+        objects += of_street
+        lights += beams
+        paths += ["scene.traffic"] * len(of_street)
+        inside_ok += [True] * len(of_street)
     environment = ""
     for index, light in enumerate(document.lights):
         path = f"scene.lights[{index}]"

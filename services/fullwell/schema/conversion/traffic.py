@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from fullwell.core.errors import FieldError, unknown_name_message
 from fullwell.core.hashing import digest_of
-from fullwell.scene import Emission, Material, Mesh, Part, SceneObject, look_at
+from fullwell.radiometry import scale_to_luminance
+from fullwell.scene import Emission, Light, Material, Mesh, Part, SceneObject, SpotLight, look_at
 from fullwell.schema.assets import candidates_of, traffic_queries
-from fullwell.schema.conversion.assets import DrawnAsset, asset_part_material, catalogue_material
+from fullwell.schema.conversion.assets import DrawnAsset, asset_part_material, catalogue_material, lamp_of
 from fullwell.schema.conversion.context import Context, fail, located
 from fullwell.schema.v1.cameras import MountDocument
 from fullwell.schema.v1.traffic import EgoDocument, TargetDocument, TrafficDocument
@@ -291,14 +292,16 @@ def _without(moment: StreetMoment, targets: Sequence[PlacedAsset]) -> tuple[Stre
 
 def street_objects(
     document: TrafficDocument, view: StreetView, viewpoints: Sequence[Viewpoint], context: Context
-) -> Iterator[SceneObject]:
-    """Yield the ground, then everything within range of a camera; each asset at the coarsest level that looks the same."""
+) -> tuple[list[SceneObject], list[Light]]:
+    """Return the ground, everything within range of a camera at the coarsest level that looks the same, and beams of lamps."""
+    objects: list[SceneObject] = []
+    lights: list[Light] = []
     for surface in view.street.surfaces:
         material, _ = catalogue_material(surface.material, "scene.traffic", context)
         mesh = Mesh(surface.vertices_m, surface.faces.astype(np.uint32))
         name = f"street/{surface.name}/{surface.material.replace('/', '-')}"
-        yield SceneObject(name, surface.name, (Part(mesh, material),), np.eye(4))
-    shown = [item for item in (*view.moment.assets, *view.targets) if item is not view.ego or _is_shown(document)]
+        objects.append(SceneObject(name, surface.name, (Part(mesh, material),), np.eye(4)))
+    shown = [item for item in (*view.moment.assets, *view.targets) if item is not view.ego or document.ego_is_shown]
     far = 0
     parts: dict[Any, tuple[Part, ...]] = {}
     drawn: dict[tuple[str, int], DrawnAsset] = {}
@@ -315,15 +318,45 @@ def street_objects(
         key = (item.asset.digest, level, item.lit, item.paint)
         if key not in parts:
             parts[key] = tuple(_parts(asset, item, context))
-        yield SceneObject(item.id, item.asset.asset_class, parts[key], item.to_world(), (asset.licence,))
+        objects.append(SceneObject(item.id, item.asset.asset_class, parts[key], item.to_world(), (asset.licence,)))
+        lights += _beams(document, item, asset, context)
+    if view.ego is not None and not document.ego_is_shown:
+        level = len(view.ego.asset.levels) - 1  # it is not seen; only where its lamps are
+        lights += _beams(document, view.ego, _drawn(view.ego, level, context), context)
     for note in view.notes:
         context.warn(f"scene.traffic: {note}")
     if far:
         context.warn(f"scene.traffic: {far} objects beyond range_m = {document.range_m:g} m from every camera are left out.")
+    return objects, lights
 
 
-def _is_shown(document: TrafficDocument) -> bool:
-    return document.ego is None or document.ego.show
+def _beams(document: TrafficDocument, item: PlacedAsset, asset: DrawnAsset, context: Context) -> Iterator[SpotLight]:
+    """Yield the cones of a vehicle's headlamps, from just before the middle of each."""
+    from fullwell.traffic.headlamps import BEAMS, beam_direction  # noqa: PLC0415
+
+    if "headlight*" not in item.lit:
+        return
+    to_world = item.to_world()
+    for part in asset.model.parts:
+        material = asset.record(part, "scene.traffic").material.name
+        if not part.name.startswith("headlight") or not material.startswith("lamp/headlight"):
+            continue
+        low, high = part.vertices_m.min(axis=0), part.vertices_m.max(axis=0)
+        place = (to_world @ np.array([high[0] + _BEFORE_LENS_M, *((low + high) / 2)[1:], 1.0]))[:3]
+        spd = lamp_of(material)
+        for beam in BEAMS[document.headlamps]:
+            direction = beam_direction(to_world[:3, 0], to_world[:3, 2], beam.down_deg)
+            # Luminous intensity is to radiant intensity what luminance is to radiance.
+            intensity = scale_to_luminance(spd, beam.intensity_cd)
+            yield SpotLight(_three(place), _three(direction), intensity, beam.beam_deg, beam.cutoff_deg, "headlights")
+
+
+_BEFORE_LENS_M: Final = 0.05
+
+
+def _three(vector: Array) -> tuple[float, float, float]:
+    x, y, z = vector.tolist()
+    return x, y, z
 
 
 def _level(item: PlacedAsset, distances_m: Sequence[float], viewpoints: Sequence[Viewpoint]) -> int:

@@ -103,6 +103,7 @@ class TrafficDocument(Document):
     style: Text = "city"
     dressed: Flag = True
     lamps: Literal["day", "night"] = "day"
+    headlamps: Literal["low", "high"] = "low"
     wet: Flag = False
     ego: EgoDocument | None = None
     targets: list[TargetDocument] = Field(default_factory=list, max_length=100)
@@ -110,6 +111,11 @@ class TrafficDocument(Document):
     licence: list[Text] = Field(default_factory=list, max_length=32)
     range_m: Annotated[float, Range(ge=10, le=5000)] = 400.0
     """Objects farther than this from every camera are left out, and the manifest counts them."""
+
+    @property
+    def ego_is_shown(self) -> bool:
+        """Whether the vehicle that carries the cameras is in the picture; without one, all vehicles are."""
+        return self.ego is None or self.ego.show
 
     @model_validator(mode="after")
     def _one_traffic(self) -> TrafficDocument:
