@@ -49,8 +49,8 @@ def _generate(store: LocalAssets, bars: Any, *, only: str, packaged: bool, appro
         asset, _ = store.add(make(), who=WHO)
         # A decision that a person has made about it stays.
         if approve and asset.state == "pending" and not asset.document["reviewed_by"]:
-            asset = store.review("approved", ids=[asset.id], reason=REASON, who=WHO)[0]
-        made.append(asset)
+            store.review("approved", ids=[asset.id], reason=REASON, who=WHO)
+        made.append(store.get(asset.id))
         bars.advance(total)
     return made
 

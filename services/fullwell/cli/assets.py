@@ -51,17 +51,22 @@ PIPE_COLUMNS: Final = 110
 
 def register(app: typer.Typer) -> None:
     """Add `fullwell assets` to `app`."""
-    commands: dict[str, Any] = {"import": import_models, "list": list_assets, "search": search, "show": show}
-    commands["approve"] = approve
-    commands |= {
+    commands: dict[str, Any] = {
+        "import": import_models,
+        "list": list_assets,
+        "search": search,
+        "show": show,
+        "approve": approve,
         "reject": reject,
         "edit": edit,
         "retire": retire,
         "export": export,
         "import-archive": import_archive,
         "gc": collect_garbage,
+        "reindex": reindex,
+        "previews": previews,
+        "starter": starter,
     }
-    commands |= {"reindex": reindex, "previews": previews, "starter": starter}
     for name, command in commands.items():
         assets_app.command(name)(command)
     app.add_typer(assets_app)
