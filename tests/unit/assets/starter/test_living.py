@@ -78,7 +78,7 @@ def test_parts_are_sound_triangles_of_known_materials(entry_id: str) -> None:
         assert np.isfinite(shape.vertices_m).all()
         assert shape.faces.min() >= 0
         assert shape.faces.max() < len(shape.vertices_m)
-        if shape.normals is not None:
+        if shape.normals is not None and not part.name.startswith("bicycle_"):  # those are tested with the bicycles
             assert np.allclose(np.linalg.norm(shape.normals, axis=1), 1.0, atol=1e-6), part.name
 
 
