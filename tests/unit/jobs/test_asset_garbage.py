@@ -9,8 +9,10 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import pytest
+from sqlalchemy import delete, update
 
 from fullwell.assets.query import AssetQuery
 from fullwell.assets.records import SourceRecord
@@ -18,6 +20,7 @@ from fullwell.assets.store import blob_key, preview_key, put_preview, version_ke
 from fullwell.core import AssetError, FieldError, NotFoundError, canonical_json, sha256_hex
 from fullwell.jobs import asset_garbage
 from fullwell.jobs.asset_library import AssetLibrary
+from fullwell.jobs.asset_rows import AssetHoldRow
 from fullwell.jobs.database import Database
 from fullwell.jobs.records import JobInput, NewJob
 from fullwell.jobs.repository import JobRepository
@@ -46,8 +49,9 @@ def age(store: LocalStore, *, by_s: float = 48 * HOUR_S) -> None:
 
 
 def release_holds(database: Database) -> None:
+    """End every hold."""
     with database.writing() as session:
-        session.execute(asset_garbage.delete(asset_garbage.AssetHoldRow))
+        session.execute(delete(AssetHoldRow))
 
 
 def put_blob(store: LocalStore, content: bytes) -> str:
@@ -98,9 +102,10 @@ def test_what_is_young_or_held_or_to_be_kept_stays(library: AssetLibrary, store:
 def test_a_hold_that_has_ended_holds_no_more(library: AssetLibrary, store: LocalStore) -> None:
     blob = put_blob(store, b"held")
     age(store)
-    library.hold([blob], for_s=0.05)
+    library.hold([blob])
     assert collect(library) == set()
-    time.sleep(0.1)
+    with library._database.writing() as session:
+        session.execute(update(AssetHoldRow).values(until=time.time() - 1.0))
     assert collect(library) == {blob}
 
 
@@ -278,6 +283,38 @@ def test_an_asset_added_between_looking_and_removing_keeps_its_old_blobs(
     monkeypatch.setattr(asset_garbage, "_references_of_stored_manifests", meanwhile)
     assert collect(library) == set()
     assert level in blobs(store)
+
+
+def test_an_asset_that_is_restored_after_it_was_chosen_to_go_stays(
+    library: AssetLibrary, store: LocalStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    entry = library.add(prepared_asset("car-1"), who="ada")
+    library.retire("car-1", who="cara")
+    age(store)
+    release_holds(library._database)
+    chosen_before = asset_garbage._retired_versions
+
+    def meanwhile(*arguments: Any, **named: Any) -> Any:
+        chosen = chosen_before(*arguments, **named)
+        assert len(chosen) == 1
+        library.restore("car-1", who="ada")
+        release_holds(library._database)
+        return chosen
+
+    monkeypatch.setattr(asset_garbage, "_retired_versions", meanwhile)
+    report = library.collect_garbage(dry_run=False, min_age_s=0.0)
+    assert (report.versions, report.blobs) == (0, 0)
+    assert library.get("car-1") == entry
+
+
+def test_an_asset_that_someone_is_about_to_restore_stays(library: AssetLibrary, store: LocalStore) -> None:
+    entry = library.add(prepared_asset("car-1"), who="ada")
+    library.retire("car-1", who="cara")
+    age(store)
+    library.hold([entry.digest])
+    assert library.collect_garbage(dry_run=False, min_age_s=0.0).versions == 0
+    release_holds(library._database)
+    assert library.collect_garbage(dry_run=False, min_age_s=0.0).versions == 1
 
 
 def test_a_job_made_between_looking_and_removing_keeps_its_files(
