@@ -64,7 +64,7 @@ def test_a_card_flags_open_questions_until_they_are_decided() -> None:
 def test_views_turn_in_order_whatever_else_is_there() -> None:
     manifest = small_car("red-car").manifest
     names = ["chart", "thumb", *(f"view_{number}" for number in (10, 2, 0, 1))]
-    shown = [address.rpartition("/")[2] for address in turntable_pictures(manifest, names)]
+    shown = [address.rpartition("/")[2] for address in turntable_pictures(manifest.look_digest, names)]
     assert shown == ["view_0.png", "view_1.png", "view_2.png", "view_10.png"]
 
 

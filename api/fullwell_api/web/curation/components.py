@@ -37,8 +37,9 @@ Handler = Callable[..., Any]
 class Shell(Element, component=FILES / "shell.js"):
     """Keyboard, address bar and theme."""
 
-    def __init__(self, *, on_key: Handler, on_address: Handler, on_theme: Handler) -> None:
+    def __init__(self, *, on_key: Handler, on_address: Handler, on_theme: Handler, on_undo: Handler) -> None:
         super().__init__()
+        self.on("undo", lambda _: on_undo())
         self.on("key", lambda event: on_key(event.args))
         self.on("address", lambda event: on_address(event.args))
         self.on("theme", lambda event: on_theme(event.args))
@@ -55,9 +56,17 @@ class Shell(Element, component=FILES / "shell.js"):
         """Remember how far the page is scrolled, and scroll to its top."""
         self.run_method("enter")
 
+    def opened(self, title: str) -> None:
+        """Name the browser's tab after what is open, and let screen readers and keys begin there."""
+        self.run_method("opened", title)
+
     def leave(self) -> None:
         """Scroll back to what `enter` remembered."""
         self.run_method("leave")
+
+    def tell_undoable(self, message: str, *, kind: str, shown_s: float) -> None:
+        """Show a notice with a button that takes back what was done; `kind` is "positive" or "info"."""
+        self.run_method("tellUndoable", message, kind, round(1000 * shown_s))
 
     def cycle_theme(self) -> None:
         """Go on to the next theme: the system's, light, dark."""
@@ -101,6 +110,10 @@ class AssetGrid(Element, component=FILES / "asset_grid.js"):
     def show(self, cards: Sequence[dict[str, Any]], *, more: bool) -> None:
         """Show these cards and no others; `more` are to be had."""
         self.run_method("show", list(cards), more)
+
+    def take_away(self, assets: Sequence[str]) -> None:
+        """Take cards away."""
+        self.run_method("remove", list(assets))
 
     def append(self, cards: Sequence[dict[str, Any]], *, more: bool) -> None:
         """Show further cards."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from nicegui import ui
 
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Decisions"]
 
-UNDO_SHOWN_MS = 8000
-DONE = {"approved": "Approved", "rejected": "Rejected", "pending": "Pending again:"}
+UNDO_SHOWN_S: Final = 8.0
+DONE: Final = {"approved": "Approved", "rejected": "Rejected", "pending": "Pending again:"}
 
 
 class Decisions:
@@ -26,7 +26,6 @@ class Decisions:
     def __init__(self, page: CurationPage) -> None:
         self._page = page
         self._undo: dict[str, ReviewState] = {}
-        ui.on("undo-decision", lambda _: self.undo())
 
     def targets(self) -> list[AssetEntry]:
         """Return what a key or button acts on: the open asset, else the selected ones, else the one in focus."""
@@ -121,12 +120,8 @@ class Decisions:
         if entries is None:
             return
         self._undo = {entry.id: entry.state for entry in targets if entry.state != decision}
-        ui.notify(
-            f"{DONE[decision]} {_named(entries)}",
-            type="positive" if decision == "approved" else "info",
-            timeout=UNDO_SHOWN_MS,
-            actions=[{"label": "Undo", "color": "white", ":handler": "() => emitEvent('undo-decision')"}],
-        )
+        kind = "positive" if decision == "approved" else "info"
+        page.shell.tell_undoable(f"{DONE[decision]} {_named(entries)}", kind=kind, shown_s=UNDO_SHOWN_S)
         opened, following = page.view.asset, self._following()
         await page.changed(entries)
         if not opened:

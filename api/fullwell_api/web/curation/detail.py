@@ -57,10 +57,21 @@ EXTENTS: Final = (("Length", "length_m"), ("Width", "width_m"), ("Height", "heig
 
 @dataclass(frozen=True, slots=True)
 class AssetRecord:
-    """All that the store knows of an asset: versions and events, newest first, and which previews each look has."""
+    """All that the store knows of an asset.
+
+    Attributes
+    ----------
+    versions, events
+        Newest first.
+    looks
+        {version: digest of its look}; versions that look alike share their previews.
+    previews
+        {digest of a look: names of its previews}.
+    """
 
     versions: tuple[AssetEntry, ...]
     events: tuple[AssetEvent, ...]
+    looks: Mapping[int, str]
     previews: Mapping[str, tuple[str, ...]]
 
     def version(self, number: int) -> AssetEntry | None:
@@ -71,8 +82,12 @@ class AssetRecord:
 def load_asset(library: AssetLibrary, asset: str) -> AssetRecord:
     """Return all of an asset; NotFoundError where there is none of that id."""
     versions = library.versions(asset)
-    looks = dict.fromkeys(entry.manifest.look_digest for entry in versions)
-    return AssetRecord(versions, library.events(asset), {look: library.preview_names(look) for look in looks})
+    looks = {entry.version: entry.manifest.look_digest for entry in versions}
+    # The colours of the parts are computed here too, once for each material: the page's own thread has no time for it.
+    for part in versions[0].manifest.parts:
+        swatch(part.material)
+    previews = {look: library.preview_names(look) for look in set(looks.values())}
+    return AssetRecord(versions, library.events(asset), looks, previews)
 
 
 class DetailView:
@@ -106,7 +121,6 @@ class DetailView:
         mine = self._round
         try:
             record = await self._page.run(load_asset, self._page.library, view.asset)
-            await self._page.run(lambda: [swatch(part.material) for part in record.versions[0].manifest.parts])
         except FullwellError as error:
             if mine == self._round:
                 self._trouble(view.asset, error)
@@ -127,6 +141,7 @@ class DetailView:
             else:
                 self._columns(entry)
         self._timer.active = self._missing is not None
+        self._page.shell.opened(entry.manifest.title)
 
     def _trouble(self, asset: str, error: FullwellError) -> None:
         self._box.clear()
@@ -146,7 +161,7 @@ class DetailView:
         with ui.element("div").classes("fw-detail-bar"):
             icon_button("Back to the assets (Esc)", "o_arrow_back", page.close)
             with ui.element("div").classes("fw-detail-name"):
-                tag("h1", manifest.title)
+                tag("h1", manifest.title).props('tabindex="-1"')
                 with ui.element("div").classes("sub"):
                     tag("span", entry.state, f"fw-state {entry.state}")
                     tag("span", manifest.id, "fw-mono")
@@ -261,7 +276,7 @@ class DetailView:
             there = "chart" in self._previews(entry)
             with box:
                 if there:
-                    shown = ui.element("img").props(f'src="{picture(entry.manifest, "chart")}"')
+                    shown = ui.element("img").props(f'src="{picture(self._look(entry), "chart")}"')
                     shown._props["alt"] = f"Spectra of the materials of {entry.manifest.title}"
                 else:
                     with ui.element("span").classes("fw-nopreview"):
@@ -274,10 +289,13 @@ class DetailView:
             self._timer.active = True
 
     def _previews(self, entry: AssetEntry) -> Sequence[str]:
-        return self._record.previews.get(entry.manifest.look_digest, ()) if self._record is not None else ()
+        return self._record.previews.get(self._look(entry), ()) if self._record is not None else ()
+
+    def _look(self, entry: AssetEntry) -> str:
+        return self._record.looks.get(entry.version, "") if self._record is not None else ""
 
     def _views(self, entry: AssetEntry) -> list[str]:
-        return turntable_pictures(entry.manifest, self._previews(entry))
+        return turntable_pictures(self._look(entry), self._previews(entry))
 
     async def _look_for_previews(self) -> None:
         """Ask whether the worker has made further pictures; done with, once all are there."""
@@ -386,7 +404,7 @@ class DetailView:
         )
         if entries is not None:
             ui.notify(f"Version {entries[0].version}: {part.name} is {chosen}", type="info")
-            await page.attempt(self._new_pictures, entries[0], newest.manifest.look_digest)
+            await page.attempt(self._new_pictures, entries[0], self._look(newest))
             await page.decisions.after(entries)
 
     def _new_pictures(self, entry: AssetEntry, old_look: str) -> None:

@@ -12,7 +12,7 @@ from nicegui import ui
 from nicegui.element import Element
 
 from fullwell.assets.query import REVIEW_STATES
-from fullwell.core import FullwellError
+from fullwell.core import FullwellError, ServiceError
 from fullwell.jobs.asset_records import AssetEntry, AssetOrder
 from fullwell_api.guards import Caller
 from fullwell_api.web.curation import dialogs
@@ -61,14 +61,14 @@ class CurationPage:
         self.library = curation.library
         self.view = view
         self.entries: list[AssetEntry] = []
-        self.total = 0
         self.focus = ""
         self.selected: list[str] = []
         self._token = token
         self._cursor = ""
         self._round = 0
         self._last_toggled = ""
-        self._theme_icon: Element | None = None
+        self._stale = False
+        self.decisions = Decisions(self)
 
     # -- who may do what ----------------------------------------------------------------------------------------------
 
@@ -84,7 +84,10 @@ class CurationPage:
         return "Sign in with a curator key to change assets" if caller is None else f"The key of {caller.name!r} may look only"
 
     async def run(self, function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
-        """Return what a function that waits returns, from a thread."""
+        """Return what a function that waits returns, from a thread; nothing is read for a page whose session has ended."""
+        if self.caller() is None:
+            ui.navigate.reload()
+            raise ServiceError("the session has ended. Sign in again.")
         return await self.curation.run(function, *args, **kwargs)
 
     async def attempt(self, function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R | None:
@@ -102,7 +105,7 @@ class CurationPage:
 
     def build(self) -> None:
         """Make all elements; data comes when the browser is there."""
-        self.shell = Shell(on_key=self._key, on_address=self._address, on_theme=self._theme)
+        self.shell = Shell(on_key=self._key, on_address=self._address, on_theme=self._theme, on_undo=self.decisions.undo)
         known = self.caller() is not None
         self._header(known)
         if not known:
@@ -123,7 +126,6 @@ class CurationPage:
         self.shade.on("click", lambda _: self._close_filters(), []).set_visibility(False)
         self.detail_box = ui.element("div")
         self.bulk_box = ui.element("div")
-        self.decisions = Decisions(self)
         self.detail = DetailView(self, self.detail_box)
         self.uploads = Uploads(self)
         ui.timer(0.0, self._begin, once=True)
@@ -239,25 +241,27 @@ class CurationPage:
     async def refresh(self) -> None:
         """Search anew, and count what other choices would show."""
         self._round += 1
+        self._stale = False
         mine, view = self._round, self.view
         self.grid.wait()
         try:
             page = await self.run(self.library.search, view.query(), limit=PAGE_CARDS, order=self.order)
             counts = await self.run(self.library.facets, view.query())
+            cards = await self.run(_cards, page.entries)
         except FullwellError as error:
             if mine == self._round:
                 self._failed(error)
             return
         if mine != self._round:
             return  # another search has begun since
-        self.entries, self._cursor, self.total = list(page.entries), page.next_cursor, page.total
+        self.entries, self._cursor = list(page.entries), page.next_cursor
         known = {entry.id for entry in self.entries}
         self._select([asset for asset in self.selected if asset in known])
         if self.focus not in known:
             self.focus = ""
         self._show_counts(counts)
         self._show_message()
-        self.grid.show([card(entry) for entry in self.entries], more=bool(self._cursor))
+        self.grid.show(cards, more=bool(self._cursor))
         self._mark()
 
     async def more(self) -> None:
@@ -269,13 +273,14 @@ class CurationPage:
             page = await self.run(
                 self.library.search, self.view.query(), cursor=self._cursor, limit=PAGE_CARDS, order=self.order
             )
+            cards = await self.run(_cards, page.entries)
         except FullwellError as error:
             ui.notify(error.message, type="negative")
             return
         if mine == self._round:
             self.entries += page.entries
             self._cursor = page.next_cursor
-            self.grid.append([card(entry) for entry in page.entries], more=bool(self._cursor))
+            self.grid.append(cards, more=bool(self._cursor))
 
     async def changed(self, entries: Sequence[AssetEntry]) -> None:
         """Show assets that have changed: where they stay in the result, where they leave it, and in the counts."""
@@ -287,22 +292,23 @@ class CurationPage:
         self._move_focus_from(gone, {entry.id for entry in kept})
         self.entries = kept
         self._select([asset for asset in self.selected if asset not in gone])
-        self.grid.show([card(entry) for entry in kept], more=bool(self._cursor))
+        self.grid.take_away(sorted(gone))
         self._mark()
         try:
+            self.grid.change(await self.run(_cards, [entry for entry in kept if entry.id in newest]))
             self._show_counts(await self.run(self.library.facets, query))
         except FullwellError as error:
             ui.notify(error.message, type="negative")
-        self.total = max(len(kept), self.total - len(gone))
         self._show_message()
         if not kept and self._cursor:
             await self.refresh()
 
     async def arrived(self) -> None:
         """Show what an import has brought, without moving what a person is looking at."""
-        if self.view.asset:
-            return  # the grid is searched anew when it comes back
-        await self.refresh()
+        # What is open may be what has got its previews; its own view looks for them.
+        self._stale = bool(self.view.asset)
+        if not self._stale:
+            await self.refresh()
 
     def _move_focus_from(self, gone: set[str], kept: set[str]) -> None:
         if self.focus in gone:
@@ -400,7 +406,7 @@ class CurationPage:
             button("Get the starter library", dialogs.explain_starter, symbol="o_auto_awesome")
 
     def _failed(self, error: FullwellError) -> None:
-        self.entries, self._cursor, self.total = [], "", 0
+        self.entries, self._cursor = [], ""
         self.grid.show([], more=False)
         self.message.clear()
         with self.message, ui.element("div").classes("fw-empty").props('role="alert"'):
@@ -521,6 +527,8 @@ class CurationPage:
             await self.detail.show(self.view)
         else:
             self.detail.clear()
+            if self._stale:
+                await self.refresh()
             self.shell.leave()
             self._show_bulk()
             self._mark(reveal=True)
@@ -578,6 +586,10 @@ class CurationPage:
             self.clear_selection()
         elif self.view.is_filtered:
             await self._filter(self.view.unfiltered())
+
+
+def _cards(entries: Sequence[AssetEntry]) -> list[dict[str, Any]]:
+    return [card(entry) for entry in entries]
 
 
 def _group(key: str, title: str, counts: dict[str, int], chosen: set[str], words: Callable[[str], str]) -> dict[str, Any]:

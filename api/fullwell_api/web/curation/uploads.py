@@ -46,7 +46,7 @@ class Uploads:
         self._terms: dict[str, UploadTerms] = {}
         self._followed: dict[str, _Followed] = {}
         settings = page.curation.services.settings
-        self._list = Uploader(allowed=not page.refusal(), address="files", most_bytes=settings.max_blob_bytes)
+        self._list = Uploader(allowed=not page.refusal(), address="files", most_bytes=settings.max_upload_bytes)
         self._list.when("chosen", self._chosen)
         self._list.when("sent", self._sent)
         self._list.when("open", page.open)

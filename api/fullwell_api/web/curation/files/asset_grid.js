@@ -82,6 +82,11 @@ export default {
       this.more = more;
       this.again();
     },
+    remove(ids) {
+      const gone = new Set(ids);
+      this.items = this.items.filter((item) => !gone.has(item.id));
+      this.again();
+    },
     change(items) {
       const changed = new Map(items.map((item) => [item.id, item]));
       this.items = this.items.map((item) => changed.get(item.id) ?? item);

@@ -4,7 +4,7 @@ const STORED = "fullwell-theme";
 
 export default {
   template: "<span hidden></span>",
-  emits: ["key", "address", "theme"],
+  emits: ["key", "address", "theme", "undo"],
   mounted() {
     this.onKey = (event) => this.key(event);
     this.onPop = () => this.$emit("address", window.location.search);
@@ -66,6 +66,11 @@ export default {
       Quasar.Dark.set(theme === "auto" ? "auto" : theme === "dark");
       this.$emit("theme", theme);
     },
+    // A notice with a way back.
+    tellUndoable(message, type, milliseconds) {
+      const actions = [{ label: "Undo", noCaps: true, handler: () => this.$emit("undo") }];
+      Quasar.Notify.create({ message, type, timeout: milliseconds, actions });
+    },
     async signIn(key) {
       const answer = await fetch("session", {
         method: "POST",
@@ -88,7 +93,12 @@ export default {
       if (this.left === undefined) this.left = window.scrollY;
       window.scrollTo({ top: 0 });
     },
+    opened(title) {
+      if (document.title !== `${title} · Fullwell`) document.querySelector(".fw-detail-name h1")?.focus({ preventScroll: true });
+      document.title = `${title} · Fullwell`;
+    },
     leave() {
+      document.title = "Assets · Fullwell";
       const top = this.left;
       this.left = undefined;
       if (top !== undefined) requestAnimationFrame(() => requestAnimationFrame(() => window.scrollTo({ top })));
