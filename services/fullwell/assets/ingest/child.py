@@ -26,7 +26,15 @@ _ADDRESS_SPACE_EXTRA: Final = 4 << 30
 _OOM_SCORE_ADJUSTMENT: Final = 800
 """When the machine's memory runs out all the same, the kernel shall choose this process."""
 
-_MODEL_LIBRARIES: Final = ("trimesh", "fast_simplification", "pxr.Usd", "PIL.PngImagePlugin", "PIL.JpegImagePlugin")
+_MODEL_LIBRARIES: Final = (
+    "trimesh",
+    "fast_simplification",
+    "pxr.Usd",
+    "pxr.UsdGeom",
+    "pxr.UsdShade",
+    "pxr.UsdUtils",
+    "PIL.PngImagePlugin",
+) + ("PIL.JpegImagePlugin", "scipy.spatial", "scipy.sparse.csgraph", "fullwell.assets.materials.rules")
 
 
 def main(arguments: list[str]) -> None:

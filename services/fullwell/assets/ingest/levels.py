@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from fullwell.assets.ingest.normals import corner_normals, face_normals, join_corners, places, same_rows
 from fullwell.assets.model import LoadedPart
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 __all__ = ["CoarserLevel", "Simplifier", "surface_distance_m"]
 
@@ -145,6 +145,8 @@ class _Surface:
 
 
 def _surface_of(vertices: Array, faces: NDArray[np.int64]) -> _Surface:
+    from scipy.spatial import cKDTree  # noqa: PLC0415  (slow to import)
+
     corners = vertices[faces]
     normals, area = face_normals(vertices, faces)
     points, owners = [corners.mean(axis=1)], [np.arange(len(faces))]
@@ -241,6 +243,9 @@ def _uv_of(part: LoadedPart, surface: _Surface, vertices: Array, faces: NDArray[
 
 def _charts(part: LoadedPart) -> NDArray[np.int32]:
     """(m,) number of the piece of the unwrapping that each triangle lies in: pieces share no texture coordinates."""
+    from scipy.sparse import coo_array  # noqa: PLC0415  (slow to import)
+    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
+
     assert part.uv is not None
     faces = part.faces.astype(np.int64)
     rows = np.concatenate([part.vertices_m, part.uv], axis=1)

@@ -8,8 +8,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from fullwell.assets.ingest.normals import corner_normals, face_normals, join_corners, places, same_rows
 from fullwell.assets.model import LoadedPart
@@ -148,6 +146,9 @@ def _turns(vertices: NDArray[np.float64], faces_at: NDArray[np.int64]) -> tuple[
     Every face stands twice in a graph, as it is and turned; neighbours across an edge that exactly two share are joined as they
     fit. A surface that can be wound one way falls into two halves there, and each half names a winding of all its faces.
     """
+    from scipy.sparse import coo_array  # noqa: PLC0415  (slow to import)
+    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
+
     table = _edge_table(faces_at)
     total = len(faces_at)
     edge_halves = np.flatnonzero(table.count[table.number] == 2)

@@ -20,8 +20,6 @@ from fullwell.assets.ingest.options import IngestError, IngestLimits, IngestOpti
 from fullwell.assets.ingest.pose import find_pose, posed_part
 from fullwell.assets.ingest.report import file_checks, mending_checks, watertight_check
 from fullwell.assets.ingest.textures import bounded_texture
-from fullwell.assets.materials.catalogue import asset_material
-from fullwell.assets.materials.colours import display_srgb, emission_srgb
 from fullwell.assets.meshes import load_model
 from fullwell.assets.model import LoadedModel, LoadedPart, ModelError
 from fullwell.assets.records import (
@@ -390,9 +388,7 @@ def prepare_built(
         raise IngestError("the generated thing holds no triangles with an area.", path="parts", value=id)
     finished = [entry.part for entry in mended]
     recipe = {part.name: part for part in built.parts}
-    chosen = [
-        _ChosenPart(part, _built_choice(part, recipe[part.name].material), recipe[part.name].paintable) for part in finished
-    ]
+    chosen = [_ChosenPart(part, _built_choice(part), recipe[part.name].paintable) for part in finished]
     size = tuple(float(side) for side in high - low)
     problems = size_problems(built.asset_class, tuple(built.tags), (size[0], size[1], size[2]))
     size_numbers = dict(zip(("length_m", "width_m", "height_m"), size, strict=True))
@@ -416,6 +412,9 @@ def prepare_built(
 
 
 def _built_part(part: BuiltPart) -> LoadedPart:
+    from fullwell.assets.materials.catalogue import asset_material  # noqa: PLC0415  (slow to import)
+    from fullwell.assets.materials.colours import display_srgb, emission_srgb  # noqa: PLC0415
+
     material = asset_material(part.material, path=f"parts[{part.name!r}].material")
     return LoadedPart(
         name=part.name,
@@ -433,5 +432,5 @@ def _built_part(part: BuiltPart) -> LoadedPart:
     )
 
 
-def _built_choice(part: LoadedPart, material: str) -> MaterialChoice:
-    return MaterialChoice("generator", asset_material(material).name, part.base_color_srgb, part.roughness, part.metallic)
+def _built_choice(part: LoadedPart) -> MaterialChoice:
+    return MaterialChoice("generator", part.material_name, part.base_color_srgb, part.roughness, part.metallic)
