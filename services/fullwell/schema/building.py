@@ -21,6 +21,7 @@ from fullwell.schema.variation import extreme_values, frame_values
 if TYPE_CHECKING:
     from fullwell.radiometry.grid import WavelengthGrid
     from fullwell.scene import Film
+    from fullwell.scene.motion import DrivingFacts
     from fullwell.schema.assets import StoredAssetFiles
     from fullwell.schema.conversion.context import Context, RecipeFiles
     from fullwell.schema.conversion.scenes import PlacedScene
@@ -163,6 +164,7 @@ class RecipeBuilder:
             recipe_json=canonical_json(plain).decode(),
             group_weights=tuple(sorted(recipe.scene.light_groups.items())),
             views=_views_on(self._views, cameras, tuple(sorted(recipe.scene.light_groups.items()))),
+            driving=_driving(recipe, context.street, cameras),
         )
 
     def _placed(
@@ -220,6 +222,17 @@ class RecipeBuilder:
             looks = [[film, [[s.model, s.exposure] for s in view.sensors]] for film, view in views]
             found.setdefault(digest_of([looks, weights]), views)
         return list(found.values())
+
+
+def _driving(recipe: RecipeDocument, street: StreetView | None, cameras: tuple[CameraRig, ...]) -> DrivingFacts | None:
+    """Return what labels may tell of the street; None without one."""
+    from fullwell.schema.conversion.driving import driving_facts  # noqa: PLC0415
+
+    if street is None or recipe.scene.traffic is None:
+        return None
+    mounted = [camera.name for camera in recipe.cameras if camera.pose.mount is not None]
+    places = [rig.camera.camera_to_world[:3, 3] for rig in cameras]
+    return driving_facts(street, places_m=places, range_m=recipe.scene.traffic.range_m, mounted=mounted)
 
 
 def _viewpoints(cameras: tuple[CameraRig, ...]) -> tuple[Viewpoint, ...]:

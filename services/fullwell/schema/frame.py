@@ -9,6 +9,7 @@ from fullwell.isp.parameters import IspSettings
 from fullwell.optics import IDEAL_LENS, OpticsOptions
 from fullwell.radiometry import WavelengthGrid
 from fullwell.scene import Camera, SceneDescription
+from fullwell.scene.motion import DrivingFacts
 from fullwell.sensor.parameters import Exposure, SensorModel
 
 __all__ = ["PRODUCTS", "CameraRig", "FrameDescription", "Quality", "SensorRig", "View"]
@@ -108,6 +109,10 @@ class FrameDescription:
     views
         For each camera, the views that frames of the recipe have of the same light, this frame's among them: what is rendered
         must serve them all, so that it need not be rendered again for the next. Empty where only this frame's counts.
+    driving
+        What labels may tell of a street; None without traffic.
+    flow_interval_s
+        Time from this frame to the one that optical flow leads to [s].
     """
 
     recipe_name: str
@@ -124,3 +129,5 @@ class FrameDescription:
     recipe_json: str
     group_weights: tuple[tuple[str, float], ...] = ()
     views: tuple[tuple[View, ...], ...] = ()
+    driving: DrivingFacts | None = None
+    flow_interval_s: float = 0.1
