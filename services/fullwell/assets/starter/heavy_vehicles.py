@@ -229,7 +229,7 @@ def _bus_front(spec: BusSpec, parts: PartList, rng: np.random.Generator, skin: S
     route = segment_text(spec.route, 0.7 * (high - low)).turned("y", float(np.rad2deg(np.arctan(slope))))
     parts.add("display_text", "plastic/orange", route.moved(surface_at(skin, "x", 0.05, z) + 0.012, 0.0, z))
     z = spec.windscreens_m[0][1] - 0.35
-    housing, arm, glass = (shape.moved(-0.28, spec.width_m / 2 - 0.04, z) for shape in heavy_mirror(0.4))
+    housing, arm, glass = (shape.moved(-0.10, spec.width_m / 2 - 0.23, z) for shape in heavy_mirror(0.4))
     parts.add_both("mirrors", "plastic/black", housing, arm)
     parts.add_pair("mirror_glass", "mirror/silver", glass)
     base = spec.windscreens_m[0][0]
@@ -261,10 +261,15 @@ def tram(
             shape = half.left(name)
             if shape is None:
                 continue
-            if number == 4:  # the last module is the first one turned round
-                middle = sum(span) / 2
-                shape = _turned_about(shape, middle)
-            _add_tram_part(parts, name, shape, materials)
+            last = number == len(spans) - 1
+            if last:  # the last module is the first one turned round
+                shape = _turned_about(shape, sum(span) / 2)
+            unlit = _TRAM_UNLIT[last].get(name)
+            if unlit:
+                parts.add_both(f"unlit_{unlit.removeprefix('plastic/')}", unlit, shape)
+            else:
+                lamp = "indicator_rear" if last and name == "indicator_front" else name
+                _add_tram_part(parts, lamp, shape, materials)
     for first, second in pairwise(spans):
         _add_bellows(parts, (second[1], first[0]), width, (low + 0.1, high - 0.12))
     _add_tram_bogies(parts, spans, width)
@@ -295,6 +300,13 @@ _TRAM_NOSE = {
     "stern": (0.01, 0.0, 0.0, 0.0, 0.0, 0.01, 0.02, 0.05),
     "columns": 84,
 }
+
+
+_TRAM_UNLIT: dict[bool, dict[str, str]] = {
+    False: {"taillight": "plastic/red", "brakelight": "plastic/red"},
+    True: {"headlight": "plastic/white", "drl": "plastic/white"},
+}
+"""Lamps that are dark at the front, and at the rear (True): a tram drives either way and has all of them at both ends."""
 
 
 def _turned_about(shape: Shape, middle_x_m: float) -> Shape:
@@ -561,7 +573,7 @@ def _add_cab_fittings(
     belt, roof, door_end = marks
     long, top, low = spec.cab
     half = spec.width_m / 2
-    housing, arm, glass = (shape.moved(-0.42, half - 0.04, roof - 0.30) for shape in heavy_mirror(0.55))
+    housing, arm, glass = (shape.moved(-0.24, half - 0.21, roof - 0.30) for shape in heavy_mirror(0.55))
     parts.add_both("mirrors", "plastic/black", housing, arm)
     parts.add_pair("mirror_glass", "mirror/silver", glass)
     visor_x = surface_at(skin, "x", 0.3, roof + 0.02)

@@ -163,19 +163,20 @@ def mudguard(
         rings.append(
             [
                 (radius_m + r) * out + np.array([0.0, y, 0.0])
-                for r, y in ((0.0, -width_m / 2), (0.0, width_m / 2), (thick_m, width_m / 2), (thick_m, -width_m / 2))
+                for r, y in ((thick_m, -width_m / 2), (thick_m, width_m / 2), (0.0, width_m / 2), (0.0, -width_m / 2))
             ]
         )
     return loft(rings).smooth(30)
 
 
-def heavy_mirror(height_m: float = 0.5, width_m: float = 0.24) -> tuple[Shape, Shape, Shape]:
-    """Return housing, arms and glass of a lorry's or bus's left mirror; its foot at the origin."""
-    centre = (0.02, 0.2, -0.05)
-    housing = rounded_box((0.11, width_m, height_m), 0.05, centre_m=centre)
-    glass = box((0.004, width_m * 0.84, height_m * 0.86), centre_m=(centre[0] - 0.055, centre[1], centre[2]))
-    top = tube([(-0.02, -0.05, 0.16), (0.0, 0.1, 0.17), (0.02, 0.2, 0.12)], 0.016)
-    low = tube([(-0.02, -0.05, -0.26), (0.0, 0.1, -0.27), (0.02, 0.2, -0.24)], 0.016)
+def heavy_mirror(height_m: float = 0.5, width_m: float = 0.2, *, reach_m: float = 0.3) -> tuple[Shape, Shape, Shape]:
+    """Return housing, arms and glass of a lorry's or bus's left mirror; its foot at the origin, `reach_m` outwards in all."""
+    y = reach_m - width_m / 2
+    housing = rounded_box((0.11, width_m, height_m), 0.05, centre_m=(0.02, y, -0.05))
+    glass = box((0.004, width_m * 0.84, height_m * 0.86), centre_m=(-0.035, y, -0.05))
+    upper, lower = height_m / 2 - 0.09, -height_m / 2 - 0.01
+    top = tube([(-0.10, -0.05, upper + 0.04), (-0.02, 0.3 * y, upper + 0.05), (0.02, y, upper)], 0.016)
+    low = tube([(-0.10, -0.05, lower), (-0.02, 0.3 * y, lower - 0.01), (0.02, y, lower + 0.03)], 0.016)
     return housing, joined([top, low]), glass
 
 

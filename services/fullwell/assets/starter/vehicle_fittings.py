@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -46,7 +47,14 @@ def rounded_box(
                     ]
                 )
         rings.append(ring)
-    return loft(rings).smooth(50).moved(*(float(value) for value in centre_m))
+    shape = loft(rings)
+    corners = shape.vertices_m[shape.faces]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return replace(shape, faces=shape.faces[area > _NO_AREA_M2]).smooth(50).moved(*(float(value) for value in centre_m))
+
+
+_NO_AREA_M2 = 1e-11
+"""Where an edge's radius leaves nothing of a side, faces of no area are left out."""
 
 
 _SEGMENTS = {
