@@ -148,7 +148,7 @@ def crowd_barrier(rng: np.random.Generator, *, length_m: float = 2.3) -> BuiltAs
     for y in (-half + 0.25, half - 0.25):
         assembly.add("feet", "metal/steel_galvanised", span((-0.34, y - 0.025, 0.0), (0.34, y + 0.025, 0.012)))
         for x in (-0.2, 0.2):
-            assembly.add("feet", "metal/steel_galvanised", tube([(x, y, 0.008), (0.0, y, low + 0.05)], 0.014, sides=10))
+            assembly.add("feet", "metal/steel_galvanised", tube([(x, y, 0.013), (0.0, y, low + 0.05)], 0.014, sides=10))
     assembly.add(
         "hooks",
         "metal/steel_galvanised",

@@ -1,7 +1,7 @@
 """The starter library: every generated asset, and the models that an installed package carries, prepared for the store.
 
 `python -m fullwell.assets.starter.library` compares what the generators make with the list in assets/catalogue.json; with
-`--write` it makes the list anew.
+`--write` it makes the list anew, all of it or the assets of some ids.
 """
 
 from __future__ import annotations
@@ -9,8 +9,9 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, is_dataclass, replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, Final
 
@@ -198,31 +199,52 @@ def catalogue_row(manifest: AssetManifest) -> dict[str, Any]:
     }
 
 
-def _rows(entries: Iterable[StarterEntry]) -> Iterator[dict[str, Any]]:
-    for entry in entries:
-        yield catalogue_row(prepare_starter(entry).manifest)
-    for asset in packaged_assets():
+def _chosen_rows(patterns: Sequence[str]) -> Iterator[dict[str, Any]]:
+    def wanted(asset_id: str) -> bool:
+        return any(fnmatchcase(asset_id, pattern) for pattern in patterns)
+
+    for entry in starter_entries():
+        if wanted(entry.id):
+            yield catalogue_row(prepare_starter(entry).manifest)
+    for asset in packaged_assets([asset_id for asset_id in packaged_ids() if wanted(asset_id)]):
         yield catalogue_row(asset.manifest)
+
+
+def _read(file: Path) -> dict[str, dict[str, Any]]:
+    return {row["id"]: row for row in json.loads(file.read_text(encoding="utf-8"))} if file.exists() else {}
+
+
+def _write(file: Path, rows: Mapping[str, Mapping[str, Any]]) -> None:
+    """Write the list in the order of the library; what is no longer in it is dropped."""
+    order = [*(entry.id for entry in starter_entries()), *packaged_ids()]
+    lines = ",\n".join("  " + json.dumps(rows[asset_id], ensure_ascii=False) for asset_id in order if asset_id in rows)
+    written = file.with_name(file.name + ".new")
+    written.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
+    written.replace(file)
 
 
 def _main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description="Compare the starter library with its list, or write the list.")
-    parser.add_argument("--write", action="store_true", help="write the list")
+    parser.add_argument("ids", nargs="*", default=["*"], help="patterns of ids, such as 'sign-*' (default: all)")
+    parser.add_argument("--write", action="store_true", help="write the list, after each asset; other rows stay")
+    parser.add_argument("--missing", action="store_true", help="only assets that are not in the list")
     parser.add_argument("--file", type=Path, default=_CATALOGUE, help="the list (default: %(default)s)")
     chosen = parser.parse_args(arguments)
-    rows = []
-    for row in _rows(starter_entries()):
-        print(f"{row['id']:36} {row['class']:18} {row['triangles'][0]:7d} triangles", file=sys.stderr)
-        rows.append(row)
+    listed = _read(chosen.file)
+    patterns = chosen.ids
+    if chosen.missing:
+        everything = [*(entry.id for entry in starter_entries()), *packaged_ids()]
+        patterns = [name for name in everything if name not in listed and any(fnmatchcase(name, p) for p in chosen.ids)]
+    different = []
+    for row in _chosen_rows(patterns):
+        print(f"{row['id']:36} {row['class']:18} {row['triangles'][0]:7d} triangles", file=sys.stderr, flush=True)
+        if listed.get(row["id"]) != row:
+            different.append(row["id"])
+        if chosen.write:
+            listed[row["id"]] = row
+            _write(chosen.file, listed)
     if chosen.write:
-        lines = ",\n".join("  " + json.dumps(row, ensure_ascii=False) for row in rows)
-        written = chosen.file.with_name(chosen.file.name + ".new")
-        written.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
-        written.replace(chosen.file)
         return 0
-    listed = {row["id"]: row for row in json.loads(chosen.file.read_text(encoding="utf-8"))}
-    made = {row["id"]: row for row in rows}
-    different = sorted(name for name in listed.keys() | made.keys() if listed.get(name) != made.get(name))
     print("\n".join(f"differs: {name}" for name in different) or "as listed")
     return 1 if different else 0
 

@@ -142,17 +142,8 @@ def _near_pairs(flat: NDArray[np.object_], depth_m: Array) -> tuple[NDArray[np.i
     return np.concatenate(firsts), np.concatenate(seconds)
 
 
-SMALL = [entry for entry in BUILT if not entry.id.startswith("building-")]
-
-
-@pytest.mark.parametrize("entry", [*SMALL, *BUILDINGS[5:6], *BUILDINGS[11:19]], ids=lambda entry: entry.id)
+@by_id
 def test_no_two_layers_fight_for_one_plane(entry: StarterEntry) -> None:
-    assert _overlaps(_built(entry.id)) == []
-
-
-@pytest.mark.slow
-@each_building
-def test_no_two_layers_of_a_building_fight_for_one_plane(entry: StarterEntry) -> None:
     assert _overlaps(_built(entry.id)) == []
 
 
