@@ -23,7 +23,7 @@ from fullwell_worker.materials import JobFolder
 if TYPE_CHECKING:
     from fullwell.assets.ingest import IngestProcess
     from fullwell.assets.records import AssetManifest
-    from fullwell.jobs.asset_library import AssetEntry, AssetLibrary
+    from fullwell.jobs.asset_library import AssetLibrary
 
 __all__ = ["AssetContext", "asset_context", "run_ingestion"]
 
@@ -31,6 +31,8 @@ PERMANENT: Final = (FieldError, ShapeError, AssetError)
 """Errors that the same files would meet again: such an ingestion is not tried twice."""
 RETRYABLE_CAUSES: Final = ("died", "unforeseen")
 """Ends of the reading process that need not be the files' fault: the machine may have run out of memory."""
+PREVIEW_PRIORITY: Final = 3
+"""That of most jobs: uploads are read before, for somebody waits for what was found."""
 READ_SHARE: Final = 0.3
 """Share of the progress that reading takes; previews take the rest."""
 
@@ -91,7 +93,7 @@ def run_ingestion(context: AssetContext, ingestion_id: str) -> None:
         started = time.monotonic()
         log.info("ingestion started")
         try:
-            preview_error = _work(context, lease, heart)
+            ending = _work(context, lease, heart)
         except CancelledError:
             log.info("ingestion stopped; another worker has it")
             return
@@ -110,24 +112,42 @@ def run_ingestion(context: AssetContext, ingestion_id: str) -> None:
             log.exception("ingestion failed")
             _record_failure(context, lease, f"{type(error).__name__}: {error}", "internal_error", retryable=True)
             return
-        patiently(lambda: context.ingestions.complete(lease, preview_error=preview_error), lease_s)
-        log.info("ingestion done", seconds=round(time.monotonic() - started, 3), preview_error=preview_error)
+        patiently(ending.record, lease_s)
+        log.info(ending.name, seconds=round(time.monotonic() - started, 3))
 
 
-def _work(context: AssetContext, lease: IngestionLease, heart: Heart) -> str:
-    """Do what is left to do; return why there are no previews, empty where there are."""
-    record = context.ingestions.get(lease.id)
+@dataclass(frozen=True, slots=True)
+class _Ending:
+    """How an attempt ended well: what to record, and its name for the log."""
+
+    name: str
+    record: Callable[[], object]
+
+
+def _work(context: AssetContext, lease: IngestionLease, heart: Heart) -> _Ending:
+    """Do the next part of the work: an upload is read first and, when all others that wait are read, gets its pictures."""
+    ingestions = context.ingestions
+    record = ingestions.get(lease.id)
+    if record.stored is None:
+        _store(context, lease, record, heart)
+        if not context.settings.preview_on_ingest:
+            return _Ending("ingestion done", lambda: ingestions.complete(lease))
+        return _Ending(
+            "ingestion goes on to previews",
+            lambda: ingestions.hand_over(lease, stage="previews", fraction=READ_SHARE, priority=PREVIEW_PRIORITY),
+        )
+    manifest = context.library.get(record.stored.asset_id, record.stored.version).manifest
     if record.kind == "previews":
-        assert record.stored is not None
-        manifest = context.library.get(record.stored.asset_id, record.stored.version).manifest
         # One picture less: then all are rendered, and the others stay to be seen until that is done.
         context.store.delete(context.library.preview_key(manifest.look_digest, "chart"))
         _render(context, manifest, heart, start=0.0)
-        return ""
-    if record.stored is None:
-        manifest = _store(context, lease, record, heart).manifest
-    else:  # an earlier attempt ended after the asset was stored
-        manifest = context.library.get(record.stored.asset_id, record.stored.version).manifest
+        return _Ending("previews done", lambda: ingestions.complete(lease))
+    preview_error = _rendered_or_why_not(context, manifest, heart)
+    return _Ending("ingestion done", lambda: ingestions.complete(lease, preview_error=preview_error))
+
+
+def _rendered_or_why_not(context: AssetContext, manifest: AssetManifest, heart: Heart) -> str:
+    """Render an asset's pictures; return why there are none, empty where there are. The asset is whole without them."""
     if not context.settings.preview_on_ingest:
         return ""
     try:
@@ -135,13 +155,12 @@ def _work(context: AssetContext, lease: IngestionLease, heart: Heart) -> str:
     except CancelledError:
         raise
     except FullwellError as error:
-        # The asset is whole without pictures; the record says why there are none.
         log.warning("previews failed", cause=str(error), code=error.code)
         return str(error)
     return ""
 
 
-def _store(context: AssetContext, lease: IngestionLease, record: IngestionRecord, heart: Heart) -> AssetEntry:
+def _store(context: AssetContext, lease: IngestionLease, record: IngestionRecord, heart: Heart) -> None:
     from fullwell.jobs.asset_requests import AssetRequest  # noqa: PLC0415
 
     request = AssetRequest.from_json(record.request_json)
@@ -167,7 +186,6 @@ def _store(context: AssetContext, lease: IngestionLease, record: IngestionRecord
         context.settings.lease_s,
     )
     log.info("asset stored", asset=entry.manifest.id, version=entry.version)
-    return entry
 
 
 def _render(context: AssetContext, manifest: AssetManifest, heart: Heart, *, start: float) -> None:

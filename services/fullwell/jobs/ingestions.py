@@ -261,6 +261,18 @@ class IngestionRepository:
             row = self._locked(session, lease.id)
             row.asset_id, row.asset_version, row.checks_json = asset.asset_id, asset.version, asset.checks_json
 
+    def hand_over(self, lease: IngestionLease, *, stage: str, fraction: float, priority: int) -> bool:
+        """Queue the rest of the work, as work of its own priority; return whether this lease still held it."""
+        with self._database.writing() as session:
+            row = self._held(session, lease)
+            if row is None:
+                return False
+            self._requeue(row, 0.0)
+            row.stage, row.fraction, row.priority = stage[:64], fraction, priority
+            row.attempt, row.strikes = 0, 0
+            row.error, row.error_code = None, None
+            return True
+
     def complete(self, lease: IngestionLease, *, preview_error: str = "") -> bool:
         """Mark the work done; return whether this lease still held it."""
         with self._database.writing() as session:

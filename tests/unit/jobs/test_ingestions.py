@@ -107,6 +107,17 @@ def test_what_a_dead_worker_held_is_taken_back_at_once_and_the_second_loss_is_th
     take(ingestions, record)
 
 
+def test_the_rest_of_the_work_is_queued_behind_what_others_wait_for(ingestions: IngestionRepository) -> None:
+    record, other = new(ingestions, "a.glb"), new(ingestions, "b.glb")
+    lease = take(ingestions, record)
+    ingestions.stored(lease, StoredAsset("a", 1))
+    assert ingestions.hand_over(lease, stage="previews", fraction=0.3, priority=4)
+    assert not ingestions.hand_over(lease, stage="previews", fraction=0.3, priority=4)
+    waiting = ingestions.get(record.id)
+    assert (waiting.state, waiting.stage, waiting.fraction, waiting.attempt) == (IngestionState.QUEUED, "previews", 0.3, 0)
+    assert [claimed for claimed, _ in ingestions.claim_due(limit=10)] == [other.id, record.id]
+
+
 def test_a_lease_is_taken_over_from_a_dead_worker_without_waiting(ingestions: IngestionRepository) -> None:
     record = new(ingestions)
     old = take(ingestions, record, holder=dead_process())

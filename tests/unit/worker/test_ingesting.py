@@ -62,6 +62,7 @@ class Bench:
         return self.context.ingestions.create(NewIngestion("upload", name, "ann", text, digest_of([text])))[0]
 
     def run(self, record: IngestionRecord) -> IngestionRecord:
+        """Do one part of the work: reading, or rendering."""
         run_ingestion(self.context, record.id)
         return self.context.ingestions.get(record.id)
 
@@ -79,7 +80,9 @@ def bench(tmp_path: Path, reader: IngestProcess) -> Bench:
 
 def test_an_asset_without_pictures_is_an_asset_and_the_record_says_why(bench: Bench) -> None:
     bench.renderer.error = RenderMemoryError("the frame needs more memory")
-    done = bench.run(bench.queue(box_glb()))
+    read = bench.run(bench.queue(box_glb()))
+    assert (read.state, read.stage, bench.renderer.asked) == ("queued", "previews", []), "others are read before"
+    done = bench.run(read)
     assert (done.state, done.error, done.preview_error) == ("done", None, "the frame needs more memory")
     assert done.stored is not None
     look = bench.context.library.get("car").manifest.look_digest
@@ -144,6 +147,6 @@ def test_nothing_is_left_on_the_workers_disk(bench: Bench, monkeypatch: pytest.M
     scratch = tmp_path / "scratch"
     scratch.mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(scratch))
-    bench.run(bench.queue(box_glb()[:-30]))
-    bench.run(bench.queue(box_glb()))
+    assert bench.run(bench.queue(box_glb()[:-30])).state == "failed"
+    assert bench.run(bench.queue(box_glb())).stored is not None
     assert list(scratch.iterdir()) == []
