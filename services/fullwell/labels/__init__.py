@@ -1,7 +1,8 @@
 """Masks, boxes, depth and visibility, through the same camera as the image."""
 
 from fullwell.labels.document import labels_document
+from fullwell.labels.driving import driving_document
 from fullwell.labels.make import make_labels
 from fullwell.labels.model import Box3D, Labels, ObjectLabel
 
-__all__ = ["Box3D", "Labels", "ObjectLabel", "labels_document", "make_labels"]
+__all__ = ["Box3D", "Labels", "ObjectLabel", "driving_document", "labels_document", "make_labels"]

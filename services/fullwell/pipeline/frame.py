@@ -19,7 +19,7 @@ from fullwell.core.rng import seed32, stream
 from fullwell.dataset import encode
 from fullwell.dataset.dng import check_dng_pattern, encode_raw_dng
 from fullwell.isp import scene_illuminant
-from fullwell.labels import Labels, labels_document, make_labels
+from fullwell.labels import Labels, driving_document, labels_document, make_labels
 from fullwell.optics import OpticsOptions
 from fullwell.pipeline.cache import LightCache, ObtainedLight, obtain_light
 from fullwell.pipeline.camera_chain import develop_picture, form_channels, form_image, take_picture
@@ -461,6 +461,9 @@ def _label_products(run: _Run, labels: Labels, view: Camera, folder: str) -> Non
         f"{folder}labels.json",
         lambda: encode.encode_json(labels_document(labels, view.intrinsics_px, view.camera_to_world)),
     )
+    driving = run.frame.driving
+    if driving is not None:
+        _add(run, f"{folder}driving.json", lambda: encode.encode_json(driving_document(labels, view, driving)))
 
 
 def _manifest(run: _Run, digest: str, products: list[dict[str, Any]]) -> dict[str, Any]:

@@ -16,7 +16,9 @@ _DISPLAY = frozenset({"image.png"})
 _SENSOR = _DISPLAY | {"raw.npz", "raw.tiff", "raw.dng"}
 _OPTICAL = _SENSOR | {"irradiance.exr"}
 _RADIANCE = _OPTICAL | {"radiance.exr"}
-_LABELS = frozenset({"depth.exr", "normals.exr", "instances.png", "semantic.png", "coverage.png", "labels.json"})
+_LABELS = frozenset(
+    {"depth.exr", "normals.exr", "instances.png", "semantic.png", "coverage.png", "labels.json", "driving.json"}
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,8 +42,15 @@ class Motion:
         cosine, sine = math.cos(angle), math.sin(angle)
         return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
+    def velocity_at(self, point_m: Array) -> Array:
+        """Return the velocity (3,) [m s^-1] of a point (3,) of the thing."""
+        if self.pivot_m is None:
+            return self.velocity_m_s
+        arm = point_m - self.pivot_m
+        return np.asarray(self.velocity_m_s + self.yaw_rate_rad_s * np.array([-arm[1], arm[0], 0.0]))
+
     def shift_m(self, points_m: Array, interval_s: float) -> Array:
-        """Return by how much (..., 3) the motion moves points (..., 3) within an interval; it may be negative."""
+        """Return by how much (..., 3) the motion moves points (..., 3) within an interval [s], which may be negative."""
         shift = np.broadcast_to(self.velocity_m_s * interval_s, points_m.shape)
         if self.yaw_rate_rad_s == 0 or self.pivot_m is None:
             return np.asarray(shift)
@@ -139,7 +146,7 @@ class SignalLinkFacts:
 
 @dataclass(frozen=True, slots=True)
 class SignalFacts:
-    """One traffic light: `controller` is SUMO's id, `state` SUMO's letter, "" where unknown, `shown` the names of what is lit."""
+    """One traffic light: SUMO's id of its `controller`, its letter of the `state` ("" where unknown), names of what is lit."""
 
     object_id: str
     controller: str

@@ -27,6 +27,7 @@ PRODUCTS: tuple[str, ...] = (
     "semantic.png",
     "coverage.png",
     "labels.json",
+    "driving.json",
 )
 """Products that `outputs` may ask for; manifest.json is always written, last."""
 

@@ -13,7 +13,7 @@ import shapely
 
 from assets_in_memory import MemoryAssets, small_car
 from fullwell.scene.motion import DrivingFacts, GroundRegion
-from fullwell.schema import build_frame, load_recipe
+from fullwell.schema import RecipeError, build_frame, load_recipe
 from fullwell.schema.conversion.driving import driving_facts
 from fullwell.schema.conversion.traffic import StreetView
 from fullwell.traffic.networks import NetworkSpec
@@ -203,3 +203,11 @@ def test_a_recipe_with_traffic_has_the_facts_and_one_without_has_none(tmp_path: 
     plain["scene"] = {"lights": plain["scene"]["lights"]}
     plain["cameras"] = plain["cameras"][1:]
     assert build_frame(load_recipe(plain)).driving is None
+
+
+def test_driving_labels_of_a_scene_without_traffic_are_refused() -> None:
+    recipe = street_recipe() | {"outputs": ["labels.json", "driving.json"]}
+    recipe["scene"] = {"lights": recipe["scene"]["lights"]}
+    with pytest.raises(RecipeError, match=r"asks for driving\.json, which tells of a street; add scene\.traffic") as caught:
+        load_recipe(recipe)
+    assert caught.value.path == "outputs"

@@ -55,6 +55,7 @@ _PRODUCTS = (
     "semantic.png",
     "coverage.png",
     "labels.json",
+    "driving.json",
 )
 """The same as ``fullwell.schema.frame.PRODUCTS`` (tested); not imported from there, so that documents load without arrays."""
 
@@ -264,6 +265,13 @@ class RecipeDocument(Document):
             if product not in _PRODUCTS:
                 refuse(f"is not known: {unknown_name_message('product', product, _PRODUCTS)}", index, value=product)
         return [product for product in _PRODUCTS if product in outputs]
+
+    @model_validator(mode="after")
+    def _has_what_products_need(self) -> RecipeDocument:
+        if "driving.json" in self.outputs and self.scene.traffic is None:
+            sentence = "asks for driving.json, which tells of a street; add scene.traffic, or ask for labels.json instead."
+            refuse(sentence, "outputs", value="driving.json")
+        return self
 
     @model_validator(mode="after")
     def _unique_names(self) -> RecipeDocument:
