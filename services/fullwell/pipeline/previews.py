@@ -34,7 +34,7 @@ PREVIEW_NAMES: Final = ("thumb", *(f"view_{number}" for number in range(VIEWS)),
 _VIEW_PX: Final = (256, 192)
 _FINER: Final = 2
 """Sensor pixels along each side of a picture's pixel: the mosaic of the colour filters is averaged away."""
-_SAMPLES: Final = 16
+_SAMPLES: Final = 8
 _ELEVATION_DEG: Final = 14.0
 _FIRST_AZIMUTH_DEG: Final = 40.0
 _HFOV_DEG: Final = 32.0
