@@ -28,8 +28,10 @@ from fullwell.scene.images import CaptureRecord, OpticalImage, RawImage
 
 __all__ = [
     "DepthImage",
+    "FlowImage",
     "decode_coverage_png",
     "decode_depth_exr",
+    "decode_flow_exr",
     "decode_ids_png",
     "decode_irradiance_exr",
     "decode_json",
@@ -40,6 +42,7 @@ __all__ = [
     "decode_rgb_png",
     "encode_coverage_png",
     "encode_depth_exr",
+    "encode_flow_exr",
     "encode_ids_png",
     "encode_irradiance_exr",
     "encode_json",
@@ -196,6 +199,39 @@ def decode_normals_exr(content: bytes) -> NDArray[np.float32]:
     """Return the (rows, cols, 3) normals that `encode_normals_exr` wrote, exactly."""
     channels, _ = _decode_exr(content)
     return np.stack([channels[f"N.{axis}"] for axis in "XYZ"], axis=-1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlowImage:
+    """Optical flow (rows, cols, 2) float32 [px], to the right and down, over an interval [s]; NaN where there is none."""
+
+    flow_px: NDArray[np.float32]
+    interval_s: float
+
+
+def encode_flow_exr(image: FlowImage) -> bytes:
+    """Return optical flow as OpenEXR, float32 [px]: flow.x to the right, flow.y down, NaN where there is none.
+
+    The attribute `interval_s` is the time that it spans, as text. Raises FieldError where a flow is Inf.
+    """
+    flow = image.flow_px
+    if flow.ndim != 3 or flow.shape[2] != 2:
+        raise ShapeError(f"flow_px has shape {flow.shape}; must be (rows, cols, 2).")
+    if np.any(np.isinf(flow)):
+        raise FieldError("flow_px holds Inf; must be finite, NaN where there is no flow.", path="flow_px")
+    attributes = {
+        "units": "px",
+        "flow": "x to the right, y down, NaN: none",
+        "interval_s": repr(float(image.interval_s)),
+        _METADATA: _compact_json({"quantity": "optical flow", "interval_s": image.interval_s}),
+    }
+    return _encode_exr({f"flow.{axis}": _float32(flow[..., k]) for k, axis in enumerate("xy")}, attributes)
+
+
+def decode_flow_exr(content: bytes) -> FlowImage:
+    """Return the flow that `encode_flow_exr` wrote, exactly."""
+    channels, metadata = _decode_exr(content)
+    return FlowImage(np.stack([channels[f"flow.{axis}"] for axis in "xy"], axis=-1), float(metadata["interval_s"]))
 
 
 # OpenEXR -------------------------------------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ from fullwell.core.rng import seed32, stream
 from fullwell.dataset import encode
 from fullwell.dataset.dng import check_dng_pattern, encode_raw_dng
 from fullwell.isp import scene_illuminant
-from fullwell.labels import Labels, driving_document, labels_document, make_labels
+from fullwell.labels import Labels, driving_document, labels_document, make_labels, optical_flow
 from fullwell.optics import OpticsOptions
 from fullwell.pipeline.cache import LightCache, ObtainedLight, obtain_light
 from fullwell.pipeline.camera_chain import develop_picture, form_channels, form_image, take_picture
@@ -30,8 +30,9 @@ from fullwell.pipeline.plan import FramePlan, plan_document, plan_frame
 from fullwell.pipeline.progress import CancelCheck, FrameProgress, ProgressCallback
 from fullwell.pipeline.stage_store import StageStore
 from fullwell.render import RenderedLight, choose_variant, query_depth, query_surfaces, render_light, tile_errors
-from fullwell.scene import Camera, Film, SceneDescription
+from fullwell.scene import Camera, ConstantEnvironment, Film, ImageEnvironment, SceneDescription, SunSky
 from fullwell.scene.images import OpticalImage, RawImage
+from fullwell.scene.motion import AT_REST
 from fullwell.schema.frame import CameraRig, FrameDescription, SensorRig
 from fullwell.sensor import ChannelCurrents, SensorModel
 from fullwell.sensor.exposures import FixedExposure
@@ -454,6 +455,7 @@ def _label_products(run: _Run, labels: Labels, view: Camera, folder: str) -> Non
     _add(run, f"{folder}depth.exr", lambda: encode.encode_depth_exr(labels.depth_z_m, labels.depth_range_m))
     _add(run, f"{folder}coverage.png", lambda: encode.encode_coverage_png(labels.coverage))
     _add(run, f"{folder}normals.exr", lambda: encode.encode_normals_exr(labels.normals_camera))
+    _add(run, f"{folder}flow.exr", lambda: encode.encode_flow_exr(_flow(run.frame, labels, view)))
     _add(run, f"{folder}instances.png", lambda: encode.encode_ids_png(labels.instances))
     _add(run, f"{folder}semantic.png", lambda: encode.encode_ids_png(labels.semantic.astype(np.uint32)))
     _add(
@@ -464,6 +466,22 @@ def _label_products(run: _Run, labels: Labels, view: Camera, folder: str) -> Non
     driving = run.frame.driving
     if driving is not None:
         _add(run, f"{folder}driving.json", lambda: encode.encode_json(driving_document(labels, view, driving)))
+
+
+_SKIES = (ConstantEnvironment, ImageEnvironment, SunSky)
+
+
+def _flow(frame: FrameDescription, labels: Labels, view: Camera) -> encode.FlowImage:
+    driving = frame.driving
+    flow = optical_flow(
+        labels,
+        view,
+        {} if driving is None else driving.motions(),
+        interval_s=frame.flow_interval_s,
+        camera_motion=AT_REST if driving is None else driving.motion_of_camera(view.name),
+        has_sky=any(isinstance(light, _SKIES) for light in frame.scene.lights),
+    )
+    return encode.FlowImage(flow, frame.flow_interval_s)
 
 
 def _manifest(run: _Run, digest: str, products: list[dict[str, Any]]) -> dict[str, Any]:

@@ -17,7 +17,16 @@ _SENSOR = _DISPLAY | {"raw.npz", "raw.tiff", "raw.dng"}
 _OPTICAL = _SENSOR | {"irradiance.exr"}
 _RADIANCE = _OPTICAL | {"radiance.exr"}
 _LABELS = frozenset(
-    {"depth.exr", "normals.exr", "instances.png", "semantic.png", "coverage.png", "labels.json", "driving.json"}
+    {
+        "depth.exr",
+        "normals.exr",
+        "flow.exr",
+        "instances.png",
+        "semantic.png",
+        "coverage.png",
+        "labels.json",
+        "driving.json",
+    }
 )
 
 

@@ -15,7 +15,7 @@ from fullwell.core.hashing import canonical_json, digest_of
 from fullwell.schema.errors import RecipeError
 from fullwell.schema.loading import document_of
 from fullwell.schema.paths import with_values
-from fullwell.schema.v1.recipe import QualityDocument, RecipeDocument
+from fullwell.schema.v1.recipe import LabelsDocument, QualityDocument, RecipeDocument
 from fullwell.schema.variation import extreme_values, frame_values
 
 if TYPE_CHECKING:
@@ -165,6 +165,7 @@ class RecipeBuilder:
             group_weights=tuple(sorted(recipe.scene.light_groups.items())),
             views=_views_on(self._views, cameras, tuple(sorted(recipe.scene.light_groups.items()))),
             driving=_driving(recipe, context.street, cameras),
+            flow_interval_s=(recipe.labels or LabelsDocument()).flow_interval_s,
         )
 
     def _placed(

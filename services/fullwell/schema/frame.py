@@ -23,6 +23,7 @@ PRODUCTS: tuple[str, ...] = (
     "irradiance.exr",
     "depth.exr",
     "normals.exr",
+    "flow.exr",
     "instances.png",
     "semantic.png",
     "coverage.png",

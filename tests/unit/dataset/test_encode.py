@@ -108,6 +108,18 @@ def test_depths_of_two_shapes_are_refused() -> None:
         encode.encode_depth_exr(np.ones((2, 2), np.float32), np.ones((2, 3), np.float32))
 
 
+def test_flow_comes_back_exactly_with_its_interval_and_without_values_where_there_is_none() -> None:
+    flow = np.random.default_rng(6).normal(size=(3, 4, 2)).astype(np.float32)
+    flow[1, 2] = np.nan
+    after = encode.decode_flow_exr(encode.encode_flow_exr(encode.FlowImage(flow, 1 / 30)))
+    assert_array_equal(after.flow_px, flow)
+    assert after.interval_s == 1 / 30
+    with pytest.raises(FieldError, match="flow_px holds Inf"):
+        encode.encode_flow_exr(encode.FlowImage(np.full((2, 2, 2), np.inf, np.float32), 0.1))
+    with pytest.raises(ShapeError, match="rows, cols, 2"):
+        encode.encode_flow_exr(encode.FlowImage(np.zeros((2, 2), np.float32), 0.1))
+
+
 def test_normals_come_back_exactly() -> None:
     normals = np.random.default_rng(4).normal(size=(3, 4, 3)).astype(np.float32)
     assert_array_equal(encode.decode_normals_exr(encode.encode_normals_exr(normals)), normals)

@@ -32,6 +32,7 @@ from fullwell.schema.v1.vary import VaryDocument
 
 __all__ = [
     "SCHEMA_NAME",
+    "LabelsDocument",
     "ObjectDocument",
     "PartDocument",
     "QualityDocument",
@@ -51,6 +52,7 @@ _PRODUCTS = (
     "irradiance.exr",
     "depth.exr",
     "normals.exr",
+    "flow.exr",
     "instances.png",
     "semantic.png",
     "coverage.png",
@@ -232,6 +234,12 @@ class QualityDocument(Document):
         return self
 
 
+class LabelsDocument(Document):
+    """Choices about labels. `flow.exr` tells where things will be seen `flow_interval_s` later."""
+
+    flow_interval_s: Annotated[float, Range(gt=0, le=60)] = 0.1
+
+
 class RecipeDocument(Document):
     """A recipe, version 1.
 
@@ -247,6 +255,7 @@ class RecipeDocument(Document):
     cameras: list[CameraDocument] = Field(min_length=1, max_length=64)
     outputs: list[str] = Field(default_factory=lambda: list(_DEFAULT_PRODUCTS), min_length=1)
     quality: QualityDocument = Field(default_factory=QualityDocument)
+    labels: LabelsDocument | None = None
     vary: VaryDocument | None = None
     files: dict[str, _Digest] = Field(default_factory=dict)
     """SHA-256 of files by their path in the recipe; a file that differs is refused."""
