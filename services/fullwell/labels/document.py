@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from fullwell.labels.model import Labels, ObjectLabel
+from fullwell.scene.motion import AT_REST, DrivingFacts
 
 __all__ = ["labels_document"]
 
@@ -14,16 +15,27 @@ _DECIMALS = 6
 """Micrometres and millionths of a pixel; what lies beyond is float noise that would only make files differ."""
 
 
-def labels_document(labels: Labels, intrinsics_px: Any, camera_to_world: Any) -> dict[str, Any]:
-    """Return `labels.json` as plain data: boxes in pixels, lengths in metres, camera axes as OpenCV."""
+def labels_document(
+    labels: Labels, intrinsics_px: Any, camera_to_world: Any, facts: DrivingFacts | None = None
+) -> dict[str, Any]:
+    """Return `labels.json` as plain data: boxes in pixels, lengths in metres, camera axes as OpenCV.
+
+    With the facts of a street each object has its velocity over ground, along the axes of world and camera.
+    """
     rows, cols = labels.instances.shape
+    objects = [_object_document(item) for item in labels.objects]
+    if facts is not None:
+        motions, to_camera = facts.motions(), np.asarray(camera_to_world, dtype=np.float64)[:3, :3].T
+        for entry in objects:
+            velocity = motions.get(entry["id"], AT_REST).velocity_m_s
+            entry["velocity"] = {"world_m_s": _numbers(velocity), "camera_m_s": _numbers(to_camera @ velocity)}
     return {
         "schema": "fullwell/labels/v1",
         "image_size_px": [cols, rows],
         "intrinsics_px": _numbers(intrinsics_px),
         "camera_to_world": _numbers(camera_to_world),
         "classes": [{"id": number + 1, "name": name} for number, name in enumerate(labels.semantic_classes)],
-        "objects": [_object_document(item) for item in labels.objects],
+        "objects": objects,
     }
 
 

@@ -458,12 +458,12 @@ def _label_products(run: _Run, labels: Labels, view: Camera, folder: str) -> Non
     _add(run, f"{folder}flow.exr", lambda: encode.encode_flow_exr(_flow(run.frame, labels, view)))
     _add(run, f"{folder}instances.png", lambda: encode.encode_ids_png(labels.instances))
     _add(run, f"{folder}semantic.png", lambda: encode.encode_ids_png(labels.semantic.astype(np.uint32)))
+    driving = run.frame.driving
     _add(
         run,
         f"{folder}labels.json",
-        lambda: encode.encode_json(labels_document(labels, view.intrinsics_px, view.camera_to_world)),
+        lambda: encode.encode_json(labels_document(labels, view.intrinsics_px, view.camera_to_world, driving)),
     )
-    driving = run.frame.driving
     if driving is not None:
         _add(run, f"{folder}driving.json", lambda: encode.encode_json(driving_document(labels, view, driving)))
 

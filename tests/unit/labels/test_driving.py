@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from fullwell.dataset.encode import encode_json
-from fullwell.labels import Labels, driving_document, make_labels
+from fullwell.labels import Labels, driving_document, labels_document, make_labels
 from fullwell.radiometry import Spectrum
 from fullwell.render import query_surfaces
 from fullwell.scene import Camera, Cube, Diffuse, Film, Lens, Part, SceneDescription, SceneObject, look_at
@@ -236,3 +236,14 @@ def test_a_camera_beside_the_pivot_of_a_turning_ego_moves_sideways_too(labels: L
 
 def test_the_document_is_plain_json(document: dict[str, Any]) -> None:
     assert json.loads(encode_json(document)) == document
+
+
+def test_labels_of_streets_have_the_velocities_too(labels: Labels, document: dict[str, Any]) -> None:
+    camera = forward_camera()
+    plain = labels_document(labels, camera.intrinsics_px, camera.camera_to_world)
+    assert not any("velocity" in item for item in plain["objects"])
+    told = labels_document(labels, camera.intrinsics_px, camera.camera_to_world, FACTS)
+    velocities = {item["id"]: item["velocity"] for item in told["objects"]}
+    for name, item in objects(document).items():
+        assert velocities[name] == item["velocity"]
+    assert velocities["light"] == {"world_m_s": [0.0, 0.0, 0.0], "camera_m_s": [0.0, 0.0, 0.0]}
