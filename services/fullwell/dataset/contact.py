@@ -23,6 +23,7 @@ from fullwell.dataset.drawing import (
     colour_map,
     distinct_colour,
     fit,
+    flow_picture,
     font,
     id_picture,
     nice_ticks,
@@ -30,6 +31,7 @@ from fullwell.dataset.drawing import (
 )
 from fullwell.dataset.encode import (
     decode_depth_exr,
+    decode_flow_exr,
     decode_ids_png,
     decode_irradiance_exr,
     decode_json,
@@ -112,7 +114,9 @@ def picture_of_products(products: Mapping[str, bytes], title: str) -> bytes:
 
 def _frame_of(products: Mapping[str, bytes]) -> _Frame:
     by_kind: dict[str, bytes] = {}
-    kinds = sorted({"image.png", "raw.npz", "raw.tiff", "radiance.exr", "irradiance.exr", "depth.exr", "normals.exr"})
+    kinds = sorted(
+        {"image.png", "raw.npz", "raw.tiff", "radiance.exr", "irradiance.exr", "depth.exr", "normals.exr", "flow.exr"}
+    )
     kinds += ["instances.png", "semantic.png", "labels.json", "manifest.json"]
     for kind in kinds:
         named = sorted(
@@ -147,6 +151,10 @@ def _panels(frame: _Frame) -> Iterator[tuple[str, str, _Draw]]:
         yield "semantic.png", "classes", _draw_semantic
     if "normals.exr" in have:
         yield "normals.exr", "right: red, up: green, towards the camera: blue", _draw_normals
+    if "flow.exr" in have:
+        image = decode_flow_exr(have["flow.exr"])
+        note = f"direction as on the wheel, {_flow_scale_px(image.flow_px):.3g} px in {_time_text(image.interval_s)} at its rim"
+        yield "flow.exr", note, _draw_flow
     for name, note in (("radiance.exr", "W / (sr m2 nm)"), ("irradiance.exr", "W / (m2 nm)")):
         if name in have:
             yield name, f"mean spectrum [{note}] and four bands", _spectral_drawing(name)
@@ -454,6 +462,29 @@ def _draw_normals(panel: Image.Image, frame: _Frame) -> None:
     shown = normals * np.array([1.0, -1.0, -1.0]) * 0.5 + 0.5
     shown[~normals.any(axis=2)] = 0.06
     _paste(panel, (np.clip(shown, 0.0, 1.0) * 255).astype(np.uint8))
+
+
+_WHEEL_PX = 64
+_LEAST_FLOW_PX = 1e-3
+"""Less is not worth spreading over the colours."""
+
+
+def _flow_scale_px(flow: NDArray[np.float32]) -> float:
+    """Return the flow that has full colour: nearly the largest, so that a few pixels do not pale the rest."""
+    lengths = np.hypot(flow[..., 0], flow[..., 1])
+    moving = lengths[np.isfinite(lengths) & (lengths > _LEAST_FLOW_PX)]
+    return float(np.percentile(moving, 98)) if len(moving) else _LEAST_FLOW_PX
+
+
+def _draw_flow(panel: Image.Image, frame: _Frame) -> None:
+    flow = decode_flow_exr(frame.products["flow.exr"]).flow_px
+    _paste(panel, flow_picture(flow, _flow_scale_px(flow)))
+    side = np.arange(_WHEEL_PX) - (_WHEEL_PX - 1) / 2
+    across, down = np.meshgrid(side, side)
+    wheel = np.stack([across, down], axis=-1) / (_WHEEL_PX / 2)
+    wheel[np.hypot(across, down) > _WHEEL_PX / 2] = np.nan
+    corner = (panel.width - _WHEEL_PX - 8, panel.height - _WHEEL_PX - 8)
+    panel.paste(Image.fromarray(flow_picture(wheel, 1.0)), corner)
 
 
 def _spectral_drawing(name: str) -> _Draw:

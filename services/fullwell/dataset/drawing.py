@@ -5,6 +5,7 @@ from __future__ import annotations
 import colorsys
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +22,7 @@ __all__ = [
     "colour_map",
     "distinct_colour",
     "fit",
+    "flow_picture",
     "font",
     "id_picture",
     "nice_ticks",
@@ -72,6 +74,24 @@ def id_picture(ids: NDArray[np.uint32]) -> NDArray[np.uint8]:
     present, where = np.unique(ids, return_inverse=True)
     palette = np.array([distinct_colour(int(number)) for number in present], dtype=np.uint8)
     return palette[where.reshape(ids.shape)]
+
+
+def flow_picture(flow: NDArray[Any], full: float) -> NDArray[np.uint8]:
+    """Return flow (rows, cols, 2), to the right and down, as colours: hue by direction, white at rest, deep from `full` on.
+
+    Red flows to the right, yellow-green up, cyan to the left, violet down. NaN is nearly black.
+    """
+    right, down = flow[..., 0].astype(np.float64), flow[..., 1].astype(np.float64)
+    known = np.isfinite(right) & np.isfinite(down)
+    right, down = np.where(known, right, 0.0), np.where(known, down, 0.0)
+    depth = np.minimum(np.hypot(right, down) / full, 1.0)
+    hue = (np.arctan2(-down, right) / (2 * np.pi)) % 1.0
+    # Each channel is 1 within a sixth of its own hue and 0 within a sixth of its opposite (HSV at full value).
+    away = np.abs((hue[..., None] - np.array([0.0, 1 / 3, 2 / 3]) + 0.5) % 1.0 - 0.5)
+    pure = np.clip(2.0 - 6.0 * away, 0.0, 1.0)
+    colours = 255.0 * (1.0 - depth[..., None] * (1.0 - pure))
+    colours[~known] = distinct_colour(0)
+    return np.rint(colours).astype(np.uint8)
 
 
 def wavelength_colour(wavelength_nm: float) -> Rgb:

@@ -13,7 +13,7 @@ from PIL import Image
 from fullwell.core import FieldError
 from fullwell.dataset import encode
 from fullwell.dataset.contact import picture_of_products
-from fullwell.dataset.drawing import colour_map, distinct_colour, nice_ticks
+from fullwell.dataset.drawing import colour_map, distinct_colour, flow_picture, nice_ticks
 from fullwell.radiometry import RadianceImage, Spectrum, WavelengthGrid
 from fullwell.scene.images import RawImage
 
@@ -69,6 +69,29 @@ def all_products() -> dict[str, bytes]:
 
 def picture(products: Mapping[str, bytes]) -> Image.Image:
     return Image.open(io.BytesIO(picture_of_products(products, "a frame")))
+
+
+def test_flow_has_a_panel_of_its_own() -> None:
+    flow = np.zeros((ROWS, COLS, 2), np.float32)
+    flow[:4] = np.nan
+    flow[8:, :, 0] = 2.0
+    alone = {"flow.exr": encode.encode_flow_exr(encode.FlowImage(flow, 0.1))}
+    shown = np.asarray(picture(alone).convert("RGB"))
+    assert (shown == (255, 0, 0)).all(axis=2).sum() > 10_000, "what flows to the right is red"
+    still = {"flow.exr": encode.encode_flow_exr(encode.FlowImage(np.zeros((ROWS, COLS, 2), np.float32), 0.1))}
+    assert (np.asarray(picture(still).convert("RGB")) == 255).all(axis=2).sum() > 100_000, "what rests is white"
+
+
+def test_colours_of_flow_tell_its_direction_and_its_size() -> None:
+    arrows = np.array([[[1.0, 0.0], [0.0, -1.0], [-1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.0, 0.0], [np.nan, 0.0], [9.0, 0.0]]])
+    right, up, left, down, half, rest, unknown, fast = flow_picture(arrows, 1.0)[0].tolist()
+    assert right == fast == [255, 0, 0]
+    assert up == [128, 255, 0]
+    assert left == [0, 255, 255]
+    assert down == [128, 0, 255]
+    assert half == [255, 128, 128]
+    assert rest == [255, 255, 255]
+    assert unknown == list(distinct_colour(0))
 
 
 def test_all_products_are_shown_and_the_bytes_are_the_same_each_time() -> None:
