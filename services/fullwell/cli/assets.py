@@ -342,7 +342,10 @@ def _list(conditions: dict[str, Any], order: str, limit: int, *, as_json: bool, 
         print("No asset meets these conditions. fullwell assets import takes models in.")
         return
     _print_assets(shown)
-    print(f"{len(shown)} assets" + ("; there are more, --limit shows them" if len(found) > limit else ""))
+    print(
+        f"{len(shown)} asset{'' if len(shown) == 1 else 's'}"
+        + ("; there are more, --limit shows them" if len(found) > limit else "")
+    )
 
 
 def show(
@@ -414,7 +417,7 @@ def _review(
         print(json.dumps({"items": [dict(asset.document) for asset in changed]}, indent=2))
     else:
         _print_assets(list(changed))
-        print(f"{len(changed)} assets are {state}")
+        print(f"{_count(len(changed))} {state}")
 
 
 def edit(
@@ -504,7 +507,7 @@ def import_archive(
         print(json.dumps({"items": [dict(asset.document) for asset in came]}, indent=2))
     else:
         _print_assets(list(came))
-        print(f"{len(came)} assets came in")
+        print(f"{len(came)} asset{'' if len(came) == 1 else 's'} came in")
 
 
 def collect_garbage(
@@ -546,7 +549,7 @@ def previews(
                 ids or [asset.id for asset in client.assets.all() if not client.assets.get(asset.id).document["previews"]]
             )
             queued = [client.assets.render_previews(asset_id).id for asset_id in wanted]
-            print(json.dumps({"ingestions": queued}) if as_json else f"{len(queued)} assets are queued for the workers")
+            print(json.dumps({"ingestions": queued}) if as_json else f"{_count(len(queued))} queued for the workers")
             return
         here = cast("LocalAssets", store)
         rows = [_Row(Path(asset.id), asset) for asset in ([here.get(each) for each in ids] if ids else here.all())]
@@ -557,7 +560,7 @@ def previews(
     else:
         for name, error in failed.items():
             print(f"{name}: {error}", file=sys.stderr)
-        print(f"{len(rows) - len(failed)} assets have pictures")
+        print(f"{_count(len(rows) - len(failed))} shown in pictures now")
     if failed:
         raise typer.Exit(1)
 
@@ -582,7 +585,7 @@ def starter(
         print(json.dumps({"items": [dict(asset.document) for asset in came]}, indent=2))
     else:
         _print_assets(came)
-        print(f"{len(came)} assets of the starter library are in the store")
+        print(f"{_count(len(came))} in the store, of the starter library")
 
 
 # -- parts ------------------------------------------------------------------------------------------------------------
@@ -724,6 +727,10 @@ def _print_assets(assets: list[Asset], *, checks: bool = False) -> None:
             ]
         table.add_row(*row)
     _console().print(table)
+
+
+def _count(number: int) -> str:
+    return "1 asset is" if number == 1 else f"{number} assets are"
 
 
 def _check_counts(asset: Asset) -> str:

@@ -127,7 +127,7 @@ def test_decisions_by_query_need_all_and_a_rejection_a_reason(fleet: Command) ->
     assert "--all for the 2 assets" in fleet("approve", "--tag", "kit", code=2)
     assert "reason" in fleet("reject", "car-0", code=1)
     assert "2 assets are approved" in fleet("approve", "--tag", "kit", "--all", "--reason", "seen")
-    assert "1 assets are rejected" in fleet("reject", "car-0", "--reason", "too plain")
+    assert "1 asset is rejected" in fleet("reject", "car-0", "--reason", "too plain")
     shown = fleet.data("show", "car-0")
     assert (shown["state"], shown["reason"]) == ("rejected", "too plain")
     assert [event["kind"] for event in shown["events"]] == ["rejected", "approved", "imported"]
@@ -150,7 +150,7 @@ def test_an_archive_moves_a_collection_to_another_home(fleet: Command, tmp_path:
     archive = tmp_path / "kit.zip"
     assert "MB" in fleet("export", "-o", archive)
     monkeypatch.setenv("FULLWELL_HOME", str(tmp_path / "elsewhere"))
-    assert "1 assets came in" in fleet("import-archive", archive, "--trust-states")
+    assert "1 asset came in" in fleet("import-archive", archive, "--trust-states")
     assert [(item["id"], item["state"]) for item in fleet.data("list")["items"]] == [("car-0", "approved")]
     archive.write_bytes(archive.read_bytes()[:-100])
     fleet("import-archive", archive, code=1)
