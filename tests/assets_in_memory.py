@@ -23,7 +23,7 @@ from fullwell.assets.starter.shapes import Shape, box
 from fullwell.core import NotFoundError
 from fullwell.core.hashing import sha256_hex
 
-__all__ = ["MemoryAssets", "small_car"]
+__all__ = ["MemoryAssets", "box_asset", "small_car", "street_boxes"]
 
 
 def small_car(
@@ -60,6 +60,61 @@ def small_car(
         source=SourceRecord("generator", "test"),
     )
     return PreparedAsset(manifest, {level.sha256: content})
+
+
+def box_asset(name: str, asset_class: str, size_m: tuple[float, float, float], *, tags: tuple[str, ...] = ()) -> PreparedAsset:
+    """Return a box of that size on the ground, with the lamps that its class has as thin plates before it."""
+    body = box(size_m, centre_m=(0, 0, size_m[2] / 2))
+    shapes = {"body": (body, "paint/grey")}
+    for lamp, material in _LAMPS.get(asset_class, {}).items():
+        plate = box((0.02, 0.3, 0.1), centre_m=(size_m[0] / 2 - 0.02, 0, 0.6 * size_m[2]))
+        shapes[lamp] = (plate, material)
+    loaded = [_loaded(part, shape) for part, (shape, _) in shapes.items()]
+    content = write_level(loaded)
+    level = LevelRecord(sum(len(part.faces) for part in loaded), sha256_hex(content), len(content))
+    parts = tuple(
+        PartRecord(part, len(shape.faces), 1.0, MaterialChoice("generator", material), paintable=part == "body")
+        for part, (shape, material) in shapes.items()
+    )
+    manifest = AssetManifest(
+        id=name,
+        title=name,
+        asset_class=asset_class,
+        tags=tags,
+        size_m=size_m,
+        levels=(level,),
+        parts=parts,
+        licence=LicenceRecord("CC0-1.0", "The testers"),
+        source=SourceRecord("generator", "test"),
+    )
+    return PreparedAsset(manifest, {level.sha256: content})
+
+
+_LAMPS = {
+    "car": {"headlight_left": "lamp/headlight_led", "taillight_left": "lamp/tail", "brakelight_left": "lamp/brake"},
+    "traffic_light": {"light_red": "lamp/traffic_red", "light_green": "lamp/traffic_green"},
+    "street_light": {"lamp": "lamp/street_led"},
+    "building": {"lit_windows_warm": "lamp/window_warm"},
+}
+
+
+def street_boxes() -> list[PreparedAsset]:
+    """Return a box for every class that streets are made of."""
+    return [
+        box_asset("sedan-box", "car", (4.7, 1.8, 1.4)),
+        box_asset("van-box", "van", (5.2, 2.0, 2.2)),
+        box_asset("bus-box", "bus", (11.9, 2.5, 3.0)),
+        box_asset("lorry-box", "lorry", (8.5, 2.5, 3.5)),
+        box_asset("cyclist-box", "cyclist", (1.8, 0.6, 1.7)),
+        box_asset("walker-box", "pedestrian", (0.4, 0.5, 1.7), tags=("adult",)),
+        box_asset("tree-box", "tree", (3.0, 3.0, 6.0)),
+        box_asset("bush-box", "bush", (1.0, 1.0, 1.0)),
+        box_asset("grass-box", "grass", (1.0, 1.0, 0.3)),
+        box_asset("house-box", "building", (10.0, 12.0, 9.0), tags=("city", "suburb")),
+        box_asset("light-box", "street_light", (2.0, 0.3, 8.0)),
+        box_asset("signal-box", "traffic_light", (0.4, 0.4, 3.2)),
+        box_asset("bin-box", "bin", (0.5, 0.5, 1.0)),
+    ]
 
 
 def _loaded(name: str, shape: Shape) -> LoadedPart:

@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from fullwell.schema import load_recipe, validate
+from assets_in_memory import MemoryAssets, street_boxes
+from fullwell.schema import RecipeBuilder, load_recipe, validate
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 NAMES = sorted(path.stem for path in EXAMPLES.glob("[0-9]*.yaml"))
@@ -37,16 +38,22 @@ def test_yaml_and_python_are_the_same_recipe(name: str) -> None:
     assert load_recipe(EXAMPLES / f"{name}.yaml").canonical_json() == load_recipe(python_recipe(name)).canonical_json()
 
 
+@pytest.fixture
+def assets(tmp_path: Path) -> MemoryAssets:
+    """A box for everything that streets are made of: what they look like is for pictures to show."""
+    return MemoryAssets(*street_boxes(), folder=tmp_path)
+
+
 @pytest.mark.parametrize("name", NAMES)
-def test_every_example_is_valid_with_the_files_it_names(name: str) -> None:
+def test_every_example_is_valid_with_the_files_it_names(name: str, assets: MemoryAssets) -> None:
     needs(name)
     document = load_recipe(EXAMPLES / f"{name}.yaml")
-    validate(document, base_dir=document.base_dir)
+    validate(document, base_dir=document.base_dir, assets=assets)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
-def test_yaml_and_python_give_the_same_bytes(name: str, tmp_path: Path) -> None:
+def test_yaml_and_python_give_the_same_bytes(name: str, tmp_path: Path, assets: MemoryAssets) -> None:
     pytest.importorskip("mitsuba")
     needs(name)
     from fullwell.pipeline import run_frame
@@ -60,6 +67,7 @@ def test_yaml_and_python_give_the_same_bytes(name: str, tmp_path: Path) -> None:
     hashes = []
     for kind, source in (("yaml", EXAMPLES / f"{name}.yaml"), ("python", python_recipe(name))):
         document = load_recipe(source, overrides=quick)
-        manifest = run_frame(document, 0, LocalStore(tmp_path / kind), "frames/0", base_dir=document.base_dir)
+        builder = RecipeBuilder(document, base_dir=EXAMPLES, assets=assets)
+        manifest = run_frame(document, 0, LocalStore(tmp_path / kind), "frames/0", builder=builder)
         hashes.append({product["name"]: product["sha256"] for product in manifest["products"]})
     assert hashes[0] == hashes[1]
