@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 
 from assets_in_memory import MemoryAssets, small_car
+from fullwell.assets.model import LoadedPart
 from fullwell.radiometry import luminance_cd_m2
 from fullwell.scene import Diffuse, Principled, RoughPlastic
 from fullwell.schema import RecipeBuilder, RecipeError, build_frame, load_recipe, validate
 from fullwell.schema.assets import asks_for_assets, pin_assets
+from fullwell.schema.conversion.assets import _one_sided
 
 DRAW: dict[str, Any] = {"kind": "asset", "class": "car"}
 
@@ -200,3 +202,14 @@ def test_an_unpinned_draw_where_nothing_can_be_searched_is_refused(assets: Memor
     with pytest.raises(RecipeError, match="holds no pins and no catalogue"):
         build_frame(load_recipe(street(DRAW)), assets=Stored())
     build_frame(pin_assets(load_recipe(street(DRAW)), assets), assets=Stored())
+
+
+def test_a_lamp_that_was_flattened_keeps_its_outer_side(tmp_path: Path) -> None:
+    flat = np.array([[-2.0, 0, 1], [-2.0, 1, 1], [-2.0, 0, 2], [-1.0, 0, 0]])
+    both = LoadedPart(
+        "taillight_left", flat, np.array([[0, 1, 2], [0, 2, 1], [0, 1, 3]], dtype=np.uint32), None, None, (1, 0, 0), None, 0.5, 0, None, True
+    )  # fmt: skip
+    kept = _one_sided(both)
+    # Of the pair the triangle that faces -x, away from the middle of the car; the third has no twin.
+    assert kept.faces.tolist() == [[0, 2, 1], [0, 1, 3]]
+    assert _one_sided(kept) is kept

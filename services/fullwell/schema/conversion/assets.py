@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
 
 from fullwell.core.errors import unknown_name_message
 from fullwell.core.rng import stream
@@ -29,8 +32,10 @@ class DrawnAsset:
     """One asset of a frame: its manifest and the triangles of one level of detail."""
 
     def __init__(self, manifest: AssetManifest, model: LoadedModel) -> None:
-        self.manifest, self.model = manifest, model
+        self.manifest = manifest
         self._records = {part.name: part for part in manifest.parts}
+        lamps = frozenset(name for name, part in self._records.items() if part.material.name.startswith(_LAMPS))
+        self.model = replace(model, parts=tuple(_one_sided(part) if part.name in lamps else part for part in model.parts))
 
     @property
     def pin(self) -> str:
@@ -48,6 +53,27 @@ class DrawnAsset:
         if part.name not in self._records:
             fail(path, f"is damaged: {self.pin} has no record of its part {part.name!r}. Import the asset again.", self.pin)
         return self._records[part.name]
+
+
+def _one_sided(lamp: LoadedPart) -> LoadedPart:
+    """Return a lamp without triangles that lie on another that faces the other way: of each pair the outer one stays.
+
+    Simplifying flattens thin lenses until their sides meet, and a surface can be seen to emit on one side only.
+    """
+    corners = lamp.vertices_m[lamp.faces.astype(np.int64)]
+    rows = np.sort(np.unique(np.round(lamp.vertices_m, 6), axis=0, return_inverse=True)[1].reshape(-1)[lamp.faces], axis=1)
+    _, group, count = np.unique(rows, axis=0, return_inverse=True, return_counts=True)
+    if count.max(initial=1) == 1:
+        return lamp
+    outwards = np.einsum(
+        "ij,ij->i", np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), corners.mean(axis=1) * [1, 1, 0]
+    )
+    order = np.lexsort((-outwards, group.reshape(-1)))
+    first = np.concatenate([[True], np.diff(group.reshape(-1)[order]) != 0])
+    return replace(lamp, faces=lamp.faces[np.sort(order[first])])
+
+
+_LAMPS: Final = "lamp/"
 
 
 def draw_asset(geometry: AssetGeometry, object_id: str, path: str, context: Context) -> DrawnAsset:
