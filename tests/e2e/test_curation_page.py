@@ -103,8 +103,8 @@ def page_of(browser: Browser, url: str, query: str = "", **options: Any) -> Iter
 
 
 def shown(page: Page, count: int) -> None:
-    """Wait until the grid has that many cards."""
-    page.wait_for_function("count => document.querySelectorAll('.fw-card:not(.fw-skeleton)').length === count", arg=count)
+    """Wait until the grid has that many assets, in the document or beyond its window."""
+    page.locator(f".fw-grid[data-count='{count}']:not(.waiting)").wait_for()
 
 
 def wait_for_query(page: Page, **wanted: str | None) -> None:
@@ -249,6 +249,7 @@ def test_the_grid_loads_as_it_is_scrolled_and_opens_again_where_it_was_left(
         page.locator("[data-id=car-00]").wait_for()
         page.mouse.wheel(0, 20_000)
         shown(page, CARS)
+        page.mouse.wheel(0, 20_000)
         page.locator("[data-id=car-70] .fw-card-open").click()
         page.get_by_role("heading", name="Car-70").wait_for()
         page.go_back()
@@ -309,6 +310,7 @@ def test_many_are_selected_edited_rejected_and_brought_back(browser: Browser, ca
         tags.press("Enter")
         page.get_by_role("button", name="Save new versions").click()
         page.get_by_text("4 new versions").wait_for()
+        page.locator(".fw-dialog").wait_for(state="detached")
         assert library.get("car-05").manifest.tags == ("fleet", "sedan")
 
         page.keyboard.press("r")
