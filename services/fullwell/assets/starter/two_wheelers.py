@@ -233,17 +233,10 @@ def _add_bar(parts: PartList, kind: BicycleKind, frame: _Frame, head: Point) -> 
     parts.add("bicycle_stem", "metal/aluminium", tube([(head[0] - 0.02, 0.0, clamp[2] - 0.015), clamp], 0.014, sides=12))
     back = frame.grip_back_m
     if kind == "sport":
-        corners = [
-            (x, 0.0, z),
-            (x, half, z),
-            (x + 0.12, half, z),
-            (x + 0.10, half, z - 0.13),
-            (x - 0.02, half + 0.01, z - 0.13),
-        ]
         path = np.concatenate(
             [
-                [corners[0]],
-                _rounded_path([(x, half - 0.05, z), (x, half, z), (x + 0.05, half, z)], count=6),
+                [(x, 0.0, z)],
+                _rounded_path([(x, half - 0.05, z), (x, half, z), (x + 0.05, half, z)], count=6)[:-1],
                 _rounded_path(
                     [(x + 0.05, half, z), (x + 0.15, half, z), (x + 0.12, half, z - 0.13), (x - 0.02, half + 0.01, z - 0.13)]
                 ),
