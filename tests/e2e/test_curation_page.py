@@ -21,6 +21,7 @@ from recipes import tiny_recipe
 
 from assets_in_memory import small_car
 from browser import Watch, chromium, opened
+from fullwell.assets.records import Check, LicenceRecord, PreparedAsset
 from fullwell.client import FullwellClient
 from fullwell.core.settings import Settings
 from fullwell.jobs.asset_library import AssetLibrary
@@ -35,6 +36,7 @@ pytestmark = [pytest.mark.service, pytest.mark.slow]
 
 CARS = 75
 """More than the grid loads at once."""
+HOSTILE = "<img src=x onerror='window.hit=1'>{{constructor.constructor('window.hit=2')()}}`${window.hit=3}`</script>"
 IMPORT_MS = 180_000
 KEYS = {"FULLWELL_API_KEYS": "just-looking", "FULLWELL_CURATOR_KEYS": "maria:let-me-change"}
 
@@ -89,6 +91,13 @@ def cars(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, AssetL
         tags = ("van", "old") if number % 2 == 0 else ("sedan",)
         library.add(small_car(f"car-{number:02d}", tags=tags, length_m=4.0 + 0.01 * number), who="filler")
     library.review(["car-00"], "approved", who="filler")
+    hostile = small_car("zz-hostile", tags=("bad",))
+    changed = hostile.manifest.with_changes(
+        title=HOSTILE,
+        checks=(Check("size", "decide", HOSTILE),),
+        licence=LicenceRecord("CC0-1.0", HOSTILE, "javascript:window.hit=4"),
+    )
+    library.add(PreparedAsset(changed, hostile.blobs), who=HOSTILE)
     with serving(home, workers=0) as url:
         yield url, library
 
@@ -248,7 +257,7 @@ def test_the_grid_loads_as_it_is_scrolled_and_opens_again_where_it_was_left(
     with page_of(browser, cars[0], "?state=all&sort=id") as (page, _):
         page.locator("[data-id=car-00]").wait_for()
         page.mouse.wheel(0, 20_000)
-        shown(page, CARS)
+        shown(page, CARS + 1)
         page.mouse.wheel(0, 20_000)
         page.locator("[data-id=car-70] .fw-card-open").click()
         page.get_by_role("heading", name="Car-70").wait_for()
@@ -385,6 +394,19 @@ def test_an_asset_that_is_not_there_is_told_with_the_nearest(browser: Browser, c
     with page_of(browser, cars[0], "?asset=car-099") as (page, _):
         page.get_by_text("cannot be shown").wait_for()
         assert "car-0" in page.locator(".fw-detail").inner_text()
+
+
+def test_text_of_an_asset_is_never_taken_for_markup(browser: Browser, cars: tuple[str, AssetLibrary]) -> None:
+    with page_of(browser, cars[0], "?state=all&tag=bad") as (page, _):
+        page.get_by_text(HOSTILE).wait_for()
+        page.locator(".fw-card-open").click()
+        page.locator(".fw-spectrum svg").wait_for()
+        assert page.get_by_role("heading", name=HOSTILE).is_visible()
+        assert page.locator(".fw-events").get_by_text(HOSTILE).is_visible()
+        assert page.locator("a[href^=javascript]").count() == 0
+        page.keyboard.press("a")
+        page.locator(".fw-dialog").get_by_text(HOSTILE).first.wait_for()
+        assert page.evaluate("window.hit") is None
 
 
 def test_a_phone_shows_everything_in_one_column(browser: Browser, cars: tuple[str, AssetLibrary]) -> None:
