@@ -89,9 +89,9 @@ def flow_picture(flow: NDArray[Any], full: float) -> NDArray[np.uint8]:
     # Each channel is 1 within a sixth of its own hue and 0 within a sixth of its opposite (HSV at full value).
     away = np.abs((hue[..., None] - np.array([0.0, 1 / 3, 2 / 3]) + 0.5) % 1.0 - 0.5)
     pure = np.clip(2.0 - 6.0 * away, 0.0, 1.0)
-    colours = 255.0 * (1.0 - depth[..., None] * (1.0 - pure))
+    colours = np.asarray(np.rint(255.0 * (1.0 - depth[..., None] * (1.0 - pure))), dtype=np.uint8)
     colours[~known] = distinct_colour(0)
-    return np.rint(colours).astype(np.uint8)
+    return colours
 
 
 def wavelength_colour(wavelength_nm: float) -> Rgb:

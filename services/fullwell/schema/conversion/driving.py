@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,7 +73,7 @@ def _user(item: PlacedAsset, rates: Mapping[str, float]) -> RoadUser:
         "velocity_m_s": item.velocity_m_s,
     }
     if mover is None:
-        role = "parked" if item.role == "parked" else "target"
+        role: Literal["parked", "target"] = "parked" if item.role == "parked" else "target"
         return RoadUser(role=role, kind=item.asset.asset_class, sumo_id="", lane="", yaw_rate_rad_s=0.0, **common)
     signals = mover.signals
     return RoadUser(
