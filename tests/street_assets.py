@@ -53,6 +53,7 @@ def manifest(name: str, asset_class: str, size_m: tuple[float, float, float]) ->
         parts=tuple(parts),
         licence=LicenceRecord("CC0-1.0"),
         source=SourceRecord("generator", "test"),
+        attributes={"column_offset_x_m": -size_m[0] / 2 + 0.15} if asset_class == "street_light" else {},
     )
 
 

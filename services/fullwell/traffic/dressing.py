@@ -26,7 +26,7 @@ from fullwell.traffic.roads import Lane, RoadNetwork
 from fullwell.traffic.sumo import TrafficError
 from fullwell.traffic.surfaces import KERB_HEIGHT_M, GroundPlan, RoadStyle
 
-__all__ = ["CAR_PAINTS", "STYLES", "StreetStyle", "draw_paint", "dress", "street_style"]
+__all__ = ["CAR_PAINTS", "STYLES", "StreetStyle", "draw_paint", "dress", "pivot_of_pole", "street_style"]
 
 Array = NDArray[np.float64]
 
@@ -175,7 +175,7 @@ def dress(
         Whether street lights and windows are lit.
     """
     site = _Site(network, plan, style, shelf, Footprints(), seed)
-    for rule in (_signals, _street_lights, _buildings, _furniture, _trees, _parked, _gardens, _layers):
+    for rule in (_signals, _signs, _street_lights, _buildings, _furniture, _trees, _parked, _gardens, _layers):
         rule(site)
     return tuple(_with_lights(item) for item in site.placed) if lights_on else tuple(site.placed)
 
@@ -188,7 +188,7 @@ _LIT: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
 def _with_lights(item: PlacedAsset) -> PlacedAsset:
     patterns = _LIT.get(item.asset.asset_class, ())
     if item.role == "building":
-        patterns = ("lit_windows*", "shop_windows*", "sign_panel*")
+        patterns = ("lit_windows*", "shop_windows*", "lobby_windows*", "sign_panel*")
     names = [part.name for part in item.asset.parts if part.material.name.startswith("lamp/")]
     lit = tuple(pattern for pattern in patterns if any(fnmatchcase(name, pattern) for name in names))
     return replace(item, lit=lit) if lit else item
@@ -204,6 +204,7 @@ class _Side:
     name: str
     lane: Lane
     walk_m: float
+    limit_m_s: float = 0.0
 
     @property
     def whole_m(self) -> float:
@@ -233,7 +234,11 @@ def _sides(network: RoadNetwork) -> list[_Side]:
     for lane in network.of_kind("sidewalk", "parking", "bike", "bus", "drive", "shoulder"):
         if lane.edge_id not in rightmost or lane.index < rightmost[lane.edge_id].index:
             rightmost[lane.edge_id] = lane
-    return [_Side(edge, lane, lane.width_m if lane.kind == "sidewalk" else 0.0) for edge, lane in sorted(rightmost.items())]
+    limits = {lane.edge_id: lane.speed_m_s for lane in network.of_kind("drive")}
+    return [
+        _Side(edge, lane, lane.width_m if lane.kind == "sidewalk" else 0.0, limits.get(edge, 0.0))
+        for edge, lane in sorted(rightmost.items())
+    ]
 
 
 def _street_lights(site: _Site) -> None:
@@ -247,15 +252,28 @@ def _street_lights(site: _Site) -> None:
         count = max(1, round((side.whole_m - 2 * _KEEP_FREE_M) / site.style.light_m)) if side.whole_m > 2 * _KEEP_FREE_M else 0
         for number in range(count):
             along_m = _KEEP_FREE_M + (number + 0.5) * (side.whole_m - 2 * _KEEP_FREE_M) / count
-            # The pivot is the middle of the whole lamp with its arm; the pole is at its back.
-            reach_m = kind.size_m[0] / 2 - 0.15
-            point, yaw = side.place(along_m, 0.5 - reach_m)
-            # Only the pole stands on the ground.
-            pole = (0.3, 0.3, kind.size_m[2])
-            base, _ = side.place(along_m, 0.5)
-            if site.taken.claim(footprint(base, yaw, pole)):
+            base, yaw = side.place(along_m, 0.5)
+            if site.taken.claim(footprint(base, yaw, _POLE_M)):
                 name = f"street_light/{side.name}/{number}"
-                site.placed.append(PlacedAsset(name, kind, "light", point, yaw + math.pi / 2))
+                turn = yaw + math.pi / 2
+                site.placed.append(PlacedAsset(name, kind, "light", pivot_of_pole(kind, base, turn), turn))
+
+
+_POLE_M: Final = (0.4, 0.4)
+"""What lights, signals and signs take of the ground."""
+
+
+def pivot_of_pole(asset: AssetManifest, base_m: Array, yaw_rad: float, *, back: bool = False) -> Array:
+    """Return where the pivot of an asset is whose pole stands at `base_m` (3,), or with `back` the pole of one at that pivot.
+
+    Assets say where their pole is (column_offset_x_m, post_offset_x_m, post_offset_y_m): not in the middle of one with an arm.
+    """
+    said = asset.attributes
+    ahead = float(said.get("column_offset_x_m", said.get("post_offset_x_m", 0.0)))
+    left = float(said.get("post_offset_y_m", 0.0))
+    cosine, sine = math.cos(yaw_rad), math.sin(yaw_rad)
+    shift = np.array([cosine * ahead - sine * left, sine * ahead + cosine * left, 0.0])
+    return np.asarray(base_m + shift if back else base_m - shift)
 
 
 def _signals(site: _Site) -> None:
@@ -273,10 +291,37 @@ def _signals(site: _Site) -> None:
             controlled.setdefault(lane.edge_id, link.signal)
     for side in _sides(site.network):
         if side.name in controlled and side.whole_m > 8.0:
-            point, yaw = side.place(side.whole_m - 0.8, 0.6)
-            pole = (0.4, 0.4, kind.size_m[2])
-            if site.taken.claim(footprint(point, yaw, pole)):
-                site.placed.append(PlacedAsset(f"signal/{side.name}", kind, "signal", point, yaw + math.pi))
+            base, yaw = side.place(side.whole_m - 0.8, 0.6)
+            if site.taken.claim(footprint(base, yaw, _POLE_M)):
+                turn = yaw + math.pi
+                pivot = pivot_of_pole(kind, base, turn)
+                site.placed.append(PlacedAsset(f"signal/{side.name}", kind, "signal", pivot, turn))
+
+
+def _signs(site: _Site) -> None:
+    """Give way where no signal rules, and the speed limit here and there; both face the drivers."""
+    controlled = {link.from_lane for link in site.network.signals}
+    signalled = {lane.edge_id for lane in site.network.lanes if lane.id in controlled}
+    crossings = [junction for junction in site.network.junctions if junction.kind not in ("dead_end", "traffic_light")]
+    centres = np.array([junction.centre_m[:2] for junction in crossings]).reshape(-1, 2)
+    for side in _sides(site.network):
+        rng = site.rng("signs", side.name)
+        limit = f"speed_limit_{5 * round(side.limit_m_s * 3.6 / 5)}"
+        wanted = [("limit", limit, 0.35 * side.whole_m)] if rng.random() < 0.3 else []
+        end = side.lane.centre_m[-1, :2]
+        if side.name not in signalled and len(centres) and np.linalg.norm(centres - end, axis=1).min() < _AT_JUNCTION_M:
+            wanted.append(("yield", "yield", side.whole_m - 1.5))
+        for name, tag, along_m in wanted:
+            asset = site.shelf.draw(rng, "traffic_sign", tag=tag)
+            if asset is None or side.whole_m < 12.0:
+                continue
+            base, yaw = side.place(along_m, 0.55)
+            if site.taken.claim(footprint(base, yaw, _POLE_M)):
+                pivot = pivot_of_pole(asset, base, yaw + math.pi)
+                site.placed.append(PlacedAsset(f"sign/{side.name}/{name}", asset, "light", pivot, yaw + math.pi))
+
+
+_AT_JUNCTION_M: Final = 20.0
 
 
 def _trees(site: _Site) -> None:

@@ -31,6 +31,7 @@ __all__ = ["StreetView", "Viewpoint", "mount_pose", "street_objects", "street_vi
 Array = NDArray[np.float64]
 
 _KEPT_STREETS: Final = 4
+_LOOK_AHEAD_S: Final = 0.1
 _STANDARD_EYE: Final = (0.05, 0.2, 0.82)
 """Driver's eyes as shares of length, width and height, where an asset does not say."""
 _LEVEL_ERROR_PX: Final = 0.7
@@ -144,7 +145,8 @@ def _spec(document: TrafficDocument, context: Context) -> StreetSpec:
         demand=demand,
         style=document.style,
         run_file=files["run"],
-        times_s=(document.time_s,),
+        # A moment later tells how things turn; a user's run may not have one.
+        times_s=(document.time_s,) if document.run else (document.time_s, document.time_s + _LOOK_AHEAD_S),
         lamps=document.lamps,
         dressed=document.dressed,
         wet=document.wet,
