@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fullwell.assets.records import AssetManifest
 from fullwell.core.rng import stream
-from fullwell.traffic.dressing import draw_paint, dress, street_style
+from fullwell.traffic.dressing import draw_paint, dress, pivot_of_pole, street_style
 from fullwell.traffic.networks import NetworkSpec, make_network
 from fullwell.traffic.placement import AssetShelf, Footprints, PlacedAsset, footprint
 from fullwell.traffic.roads import Lane, RoadNetwork, read_network
@@ -293,15 +293,14 @@ def _without_overlaps(movers: Sequence[PlacedAsset], standing: Sequence[PlacedAs
     taken = Footprints()
     for item in movers:
         taken.take(footprint(item.position_m, item.yaw_rad, _body(item.asset)))
-    kept = [item for item in standing if item.role in _FIXED or taken.is_free(_ground(item))]
+    kept = [item for item in standing if item.role == "building" or taken.is_free(_ground(item))]
     return kept, len(standing) - len(kept)
 
 
-_FIXED: Final = frozenset({"building", "light", "signal"})
-"""They stand where traffic never is, and a pole is thinner than the asset's bounds."""
-
-
 def _ground(item: PlacedAsset) -> Any:
+    """Return what touches the ground: trunks and poles, not crowns and arms."""
     if item.asset.asset_class == "tree":
         return footprint(item.position_m, item.yaw_rad, (0.5, 0.5))
+    if item.role in ("light", "signal"):
+        return footprint(pivot_of_pole(item.asset, item.position_m, item.yaw_rad, back=True), item.yaw_rad, (0.4, 0.4))
     return item.outline()
