@@ -436,7 +436,7 @@ class DetailView:
         kind = asset_class(manifest.asset_class)
         with ui.element("section").classes("fw-panel"):
             tag("h2", "Dimensions")
-            with ui.element("table").classes("fw-table"), ui.element("tbody"):
+            with ui.element("div").classes("fw-scroll"), ui.element("table").classes("fw-table"), ui.element("tbody"):
                 for (word, field), extent_m in zip(EXTENTS, manifest.size_m, strict=True):
                     low, high = getattr(kind, field)
                     fits = low <= extent_m <= high
@@ -482,13 +482,13 @@ class DetailView:
     def _levels(self, entry: AssetEntry) -> None:
         with ui.element("section").classes("fw-panel"):
             tag("h2", "Levels of detail")
-            with ui.element("table").classes("fw-table"), ui.element("tbody"):
+            with ui.element("div").classes("fw-scroll"), ui.element("table").classes("fw-table"), ui.element("tbody"):
                 for number, level in enumerate(entry.manifest.levels):
                     with ui.element("tr"):
                         tag("td", f"Level {number}")
                         tag("td", f"{level.triangles:,} triangles", "r")
                         tag("td", bytes_text(level.bytes), "r")
-                        tag("td", f"± {1000 * level.error_m:.3g} mm" if level.error_m else "exact", "r fw-soft")
+                        tag("td", f"± {1000 * level.error_m:.3g} mm" if level.error_m else "exact", "r fw-soft fw-only-wide")
                         with ui.element("td").classes("r"):
                             address = f"{_model_address(entry, number)}?download=1"
                             icon_button(f"Download level {number} as GLB", "o_download", href=address)

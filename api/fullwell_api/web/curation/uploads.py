@@ -23,7 +23,7 @@ __all__ = ["Uploads", "row_of"]
 
 POLL_S: Final = 1.0
 ADOPTED: Final = 20
-SHOWN_CHECKS: Final = 6
+SHOWN_CHECKS: Final = 3
 STAGES: Final = {"": "reading the model", "previews": "rendering previews"}
 
 
@@ -144,15 +144,18 @@ def row_of(record: IngestionRecord) -> dict[str, Any]:
     row: dict[str, Any] = {"fraction": record.fraction, "asset": "", "retry": False, "checks": []}
     if record.stored is not None:
         checks = json.loads(record.stored.checks_json)
-        shown = [check for check in checks if check["state"] != "ok"]
+        concerns = ("failed", "decide", "warning")
+        shown = sorted((one for one in checks if one["state"] in concerns), key=lambda one: concerns.index(one["state"]))
         row |= {
             "asset": record.stored.asset_id,
             "checks": [{"state": check["state"], "text": check["message"]} for check in shown[:SHOWN_CHECKS]],
         }
     if record.state == IngestionState.QUEUED:
-        return row | {"state": "queued", "note": "waiting for a worker"}
+        note = "waiting for a worker" if record.stored is None else "imported, waiting for its previews"
+        return row | {"state": "queued", "note": note}
     if record.state == IngestionState.RUNNING:
-        return row | {"state": "running", "note": STAGES.get(record.stage, record.stage.replace("_", " "))}
+        stage = "previews" if record.stored is not None else record.stage
+        return row | {"state": "running", "note": STAGES.get(stage, stage.replace("_", " "))}
     if record.state == IngestionState.FAILED:
         return row | {"state": "failed", "note": record.error or "failed", "retry": True}
     if record.preview_error:

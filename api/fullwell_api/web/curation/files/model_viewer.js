@@ -264,7 +264,7 @@ export default {
       middle.y = size.y / 2 + beside;
       const round = 0.5 * Math.hypot(size.x, Math.max(size.y, this.scale ? PERSON_M : 0), size.z) + (this.scale ? 0.55 : 0.1);
       const narrow = Math.min(1, this.camera.aspect);
-      const away = (0.86 * round) / Math.sin((this.camera.fov * Math.PI) / 360) / narrow;
+      const away = (0.92 * round) / Math.sin((this.camera.fov * Math.PI) / 360) / narrow;
       this.controls.target.copy(middle);
       this.camera.position.copy(middle).add(new THREE.Vector3(0.78, 0.34, 0.98).normalize().multiplyScalar(away));
       this.camera.near = away / 200;

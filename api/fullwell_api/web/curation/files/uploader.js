@@ -140,7 +140,7 @@ export default {
     async start(note) {
       const files = this.waiting;
       this.waiting = [];
-      this.folded = false;
+      this.folded = window.innerWidth < 600;
       const models = files.filter(({ path }) => isModel(path));
       const beside = files.filter(({ path }) => !isModel(path));
       const rows = models.map((model) => ({
@@ -192,6 +192,7 @@ export default {
     },
     // Work that was going on before the page was opened.
     adopt(rows) {
+      this.folded ||= window.innerWidth < 600;
       const known = new Set(this.rows.map((row) => row.key));
       this.rows.push(...rows.filter((row) => !known.has(row.key)));
     },
