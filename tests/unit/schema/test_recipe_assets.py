@@ -206,9 +206,8 @@ def test_an_unpinned_draw_where_nothing_can_be_searched_is_refused(assets: Memor
 
 def test_a_lamp_that_was_flattened_keeps_its_outer_side(tmp_path: Path) -> None:
     flat = np.array([[-2.0, 0, 1], [-2.0, 1, 1], [-2.0, 0, 2], [-1.0, 0, 0]])
-    both = LoadedPart(
-        "taillight_left", flat, np.array([[0, 1, 2], [0, 2, 1], [0, 1, 3]], dtype=np.uint32), None, None, (1, 0, 0), None, 0.5, 0, None, True
-    )  # fmt: skip
+    faces = np.array([[0, 1, 2], [0, 2, 1], [0, 1, 3]], dtype=np.uint32)
+    both = LoadedPart("taillight_left", flat, faces, None, None, (1.0, 0.0, 0.0), None, 0.5, 0.0, None, True)
     kept = _one_sided(both)
     # Of the pair the triangle that faces -x, away from the middle of the car; the third has no twin.
     assert kept.faces.tolist() == [[0, 2, 1], [0, 1, 3]]
