@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -45,6 +46,8 @@ def main() -> None:
         if CAR not in known:
             raise SystemExit(f"{home} holds no asset {CAR}. Run: fullwell assets starter")
         client.assets.review("pending", ids=[asset for asset in known if asset != CAR][:PENDING], reason="for the pictures")
+        while client.assets.ingestions(state="running") or client.assets.ingestions(state="queued"):
+            time.sleep(2)
         repaint(browser, url)
         grid(browser, url)
         detail(browser, url)
@@ -93,7 +96,7 @@ def grid(browser: Browser, url: str) -> None:
 
 def detail(browser: Browser, url: str) -> None:
     """An asset, light and dark, and the choice of a material."""
-    for name, scheme, height in (("detail", "light", 1500), ("dark", "dark", 900)):
+    for name, scheme, height in (("detail", "light", 1640), ("dark", "dark", 900)):
         address = f"{url}/assets/?state=all&asset=sedan-01"
         with opened(browser, address, size=(1440, height), color_scheme=scheme) as (page, _):
             page.locator(".fw-spectrum svg").wait_for()
@@ -101,6 +104,7 @@ def detail(browser: Browser, url: str) -> None:
             page.get_by_role("button", name="Show the spectrum of body").click()
             save(page, name)
             if scheme == "light":
+                page.set_viewport_size({"width": 1180, "height": 760})
                 page.get_by_role("button", name="Change").click()
                 page.get_by_label("Find a material").fill("paint")
                 save(page, "material")
@@ -140,7 +144,7 @@ def upload(browser: Browser, url: str, client: FullwellClient) -> None:
             files[-1].write_bytes(client.assets.level(asset, 0))
         broken = Path(folder) / "half a bus.glb"
         broken.write_bytes(files[0].read_bytes()[:5000])
-        with opened(browser, f"{url}/assets/?state=all&sort=title", size=(1440, 900)) as (page, _):
+        with opened(browser, f"{url}/assets/?state=all&sort=title", size=(1180, 760)) as (page, _):
             page.locator(".fw-card img").first.wait_for()
             page.set_input_files("input[type=file]", [*files, broken])
             for label, text in (("Class", "car"), ("Licence", "CC-BY-4.0")):
@@ -154,8 +158,8 @@ def upload(browser: Browser, url: str, client: FullwellClient) -> None:
             save(page, "import")
             page.locator(".fw-dialog").get_by_role("button", name="Import").click()
             page.locator("[data-upload].failed").wait_for(timeout=180_000)
-            page.locator("[data-upload] .fw-tray-checks").first.wait_for(timeout=180_000)
-            save(page, "progress", settle_ms=500)
+            page.locator("[data-upload].done").first.wait_for(timeout=600_000)
+            save(page, "progress")
 
 
 def phone(browser: Browser, url: str) -> None:

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any, Final
 from nicegui import ui
 
 from fullwell.core import FullwellError
+from fullwell.jobs.asset_library import AssetLibrary
 from fullwell.jobs.asset_requests import AssetRequest
 from fullwell.jobs.ingestions import IngestionRecord, IngestionState
 from fullwell_api.routes.assets import queue_import
 from fullwell_api.web.curation import dialogs
 from fullwell_api.web.curation.components import Uploader
 from fullwell_api.web.curation.dialogs import UploadTerms
+from fullwell_api.web.curation.words import picture
 
 if TYPE_CHECKING:
     from fullwell_api.web.curation.page import CurationPage
@@ -123,10 +125,10 @@ class Uploads:
         for followed in open_ones:
             try:
                 record = await self._page.run(ingestions.get, followed.ingestion)
+                row = row_of(record) | await self._page.run(_picture_of, self._page.library, record)
             except FullwellError as error:
                 changes.append({"key": followed.row, "note": error.message})
                 continue
-            row = row_of(record)
             came |= (record.stored is not None and not followed.stored) or row["state"] == "done"
             followed.stored = record.stored is not None
             if row != followed.shown:
@@ -137,6 +139,14 @@ class Uploads:
         if came:
             await self._page.arrived()
         self._timer.active = any(one.shown.get("state") not in ("done", "failed") for one in self._followed.values())
+
+
+def _picture_of(library: AssetLibrary, record: IngestionRecord) -> dict[str, str]:
+    """Return where the picture of a finished import is; nothing for others."""
+    if record.state != IngestionState.DONE or record.stored is None or record.preview_error:
+        return {}
+    manifest = library.get(record.stored.asset_id, record.stored.version).manifest
+    return {"picture": picture(manifest.look_digest, "thumb")}
 
 
 def row_of(record: IngestionRecord) -> dict[str, Any]:
