@@ -37,7 +37,7 @@ RECIPE: dict[str, Any] = {
     "cameras": [
         {
             "name": "mast",
-            "pose": {"origin_m": [86, 84, 9], "target_m": [104, 103, 0]},
+            "pose": {"origin_m": [91, 91, 8], "target_m": [108, 105, 0]},
             "lens": {"hfov_deg": 70, "f_number": 2.0},
             "sensors": [{"name": "main", "model": "ar0132at-rgb", "rows": 180, "cols": 320, "exposure": {"auto": {}}}],
         }

@@ -69,7 +69,7 @@ SCENES: dict[str, dict[str, Any]] = {
             },
             "time_s": 41,
         },
-        "pose": {"origin_m": [84, 82, 10], "target_m": [104, 103, 0]},
+        "pose": {"origin_m": [91, 91, 8], "target_m": [108, 105, 0]},
         "light": sun(35, 140),
         "seed": 12,
     },
@@ -86,7 +86,7 @@ SCENES: dict[str, dict[str, Any]] = {
     },
     "roundabout": {
         "traffic": {"network": {"layout": "roundabout", "length_m": 220}, "demand": VILLAGE, "style": "suburb", "time_s": 40},
-        "pose": {"origin_m": [60, 62, 9], "target_m": [110, 108, 0]},
+        "pose": {"origin_m": [127, 127, 7], "target_m": [148, 120, 0]},
         "light": sun(45, 200),
         "seed": 26,
     },
