@@ -12,7 +12,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from PIL import Image, ImageDraw
+from PIL import Image, ImageDraw, ImageFilter
 
 from fullwell.assets.query import AssetQuery
 from fullwell.assets.records import AssetManifest
@@ -52,7 +52,7 @@ def picture(manifest: AssetManifest, assets: CataloguedAssets, folder: Path) -> 
     store = LocalStore(folder)
     run_frame(document, 0, store, manifest.id, builder=RecipeBuilder(document, assets=assets))
     with Image.open(io.BytesIO(store.get(f"{manifest.id}/image.png"))) as image:
-        return image.convert("RGB").resize(CELL_PX, Image.Resampling.LANCZOS)
+        return image.convert("RGB").filter(ImageFilter.MedianFilter(3)).resize(CELL_PX, Image.Resampling.LANCZOS)
 
 
 def sheet(pictures: list[tuple[AssetManifest, Image.Image]]) -> Image.Image:

@@ -10,7 +10,7 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw
+from PIL import Image, ImageDraw, ImageFilter
 
 from fullwell.assets.materials.catalogue import asset_material
 from fullwell.assets.materials.colours import spectrum_points
@@ -360,7 +360,8 @@ def _plot(pen: ImageDraw.ImageDraw, box: tuple[int, int, int, int], points: list
 
 def _picture(store: ObjectStore, key: str) -> Image.Image:
     with Image.open(io.BytesIO(store.get(key))) as picture:
-        return picture.convert("RGB").reduce(_FINER)
+        # For people: the median takes the grain of few rays away, at the finer resolution, so that edges stay.
+        return picture.convert("RGB").filter(ImageFilter.MedianFilter(3)).reduce(_FINER)
 
 
 def _sheet(views: list[Image.Image]) -> Image.Image:
