@@ -1,6 +1,8 @@
 """Make the pictures that stand beside the examples: one of all products, and for sweeps one of all frames.
 
-Run: python examples/make_pictures.py [--quick] [FOLDER]   (default folder: examples/pictures; --quick renders them tiny)
+Streets draw from this machine's asset store: fullwell assets starter --approve --no-previews
+
+Run: python examples/make_pictures.py [--quick] [--only TEXT] [FOLDER]   (default: examples/pictures; --quick renders tiny ones)
 """
 
 from __future__ import annotations
@@ -13,9 +15,12 @@ from pathlib import Path
 from PIL import Image, ImageDraw
 
 from fullwell.core import atomic_write
+from fullwell.core.settings import load_settings
 from fullwell.dataset.contact import picture_of_products
 from fullwell.pipeline import LightCache, render_frame
+from fullwell.pipeline.assets import assets_of_settings
 from fullwell.schema import RecipeBuilder, load_recipe
+from fullwell.schema.assets import asks_for_assets, pin_assets
 from fullwell.storage import LocalStore
 
 HERE = Path(__file__).parent
@@ -27,27 +32,37 @@ QUICK = {"quality": "{samples_per_pixel: 2}"}
 
 def main(arguments: list[str]) -> None:
     quick = "--quick" in arguments
-    folders = [Path(word) for word in arguments if not word.startswith("--")]
+    only = arguments[arguments.index("--only") + 1] if "--only" in arguments else ""
+    folders = [Path(word) for word in arguments if not word.startswith("--") and word != only]
     target = folders[0] if folders else HERE / "pictures"
     for recipe in sorted(HERE.glob("[0-9][0-9]_*.yaml")):
-        make(recipe, target, overrides=QUICK if quick else {})
+        if only in recipe.stem:
+            make(recipe, target, overrides=QUICK if quick else {})
 
 
 def make(recipe: Path, target: Path, *, overrides: dict[str, str]) -> None:
     """Render every frame of a recipe and write its pictures."""
-    document = load_recipe(recipe, overrides=overrides)
-    builder, cache = RecipeBuilder(document, base_dir=document.base_dir), LightCache()
+    document, assets = load_recipe(recipe, overrides=overrides), None
+    if asks_for_assets(document):
+        assets = assets_of_settings(load_settings())
+        document = pin_assets(document, assets)
+    builder, cache = RecipeBuilder(document, base_dir=document.base_dir, assets=assets), LightCache()
     frames = [builder.frame(index) for index in range(document.frame_count())]
     with tempfile.TemporaryDirectory() as folder:
         store = LocalStore(Path(folder))
         for frame in frames:
             render_frame(frame, store, f"{frame.index}", cache=cache)
         first = {info.key.partition("/")[2]: store.get(info.key) for info in store.list("0/")}
-        images = [Image.open(io.BytesIO(store.get(f"{frame.index}/image.png"))) for frame in frames]
+        images = [Image.open(io.BytesIO(first_picture(store, f"{frame.index}/"))) for frame in frames]
     save(picture_of_products(first, f"{document.name}, frame 0"), target / f"{recipe.stem}.png")
     if len(frames) > 1:
         captions = [", ".join(f"{path.rpartition('.')[2]} {value}" for path, value in frame.varied) for frame in frames]
         save(strip(images, captions), target / f"{recipe.stem}_frames.jpg")
+
+
+def first_picture(store: LocalStore, prefix: str) -> bytes:
+    """Return the picture of a frame, of its first sensor by name where it has several."""
+    return store.get(next(info.key for info in store.list(prefix) if info.key.endswith("image.png")))
 
 
 def strip(images: list[Image.Image], captions: list[str]) -> bytes:

@@ -110,6 +110,8 @@ def test_scenes_of_one_kind_share_recordings_but_nothing_else() -> None:
     full = replace(SCENES["diffuse_box"](), samples=8)
     bare = replace(full, scene=SceneDescription((*box()[1:4], ceiling_lamp(0.3))))
     first = [our_image(comparison, 0) for comparison in (full, bare, full, bare)]
+    for comparison in (full, bare):  # what another test of this process has recorded may be seen for the second time now
+        our_image(comparison, 0)
     before = recordings()
     again = [our_image(comparison, 0) for comparison in (bare, full)]
     assert recordings() == before
