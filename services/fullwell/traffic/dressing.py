@@ -93,7 +93,7 @@ STYLES: Final[Mapping[str, StreetStyle]] = MappingProxyType(
             },
             parking_share=0.75,
             building_tag="city",
-            layers=((60.0, 250.0, 6.0),),
+            layers=((60.0, 250.0, 2.0),),
             surfaces=RoadStyle(ground="concrete/grey"),
         ),
         "suburb": StreetStyle(
@@ -105,7 +105,7 @@ STYLES: Final[Mapping[str, StreetStyle]] = MappingProxyType(
             building_gap_m=4.0,
             building_share=0.9,
             building_tag="suburb",
-            layers=((15.0, 60.0, 25.0), (60.0, 250.0, 12.0)),
+            layers=((15.0, 60.0, 8.0), (60.0, 250.0, 2.0)),
             gardens=9.0,
         ),
         "rural": StreetStyle(
@@ -115,14 +115,14 @@ STYLES: Final[Mapping[str, StreetStyle]] = MappingProxyType(
             building_gap_m=40.0,
             building_share=0.25,
             building_tag="suburb",
-            layers=((5.0, 40.0, 40.0), (40.0, 120.0, 60.0), (120.0, 300.0, 40.0)),
+            layers=((5.0, 40.0, 14.0), (40.0, 120.0, 7.0), (120.0, 300.0, 2.0)),
             gardens=4.0,
             surfaces=RoadStyle(edge_lines=True, zebra=False),
         ),
         "motorway": StreetStyle(
             light_m=0.0,
             building_share=0.0,
-            layers=((12.0, 40.0, 50.0), (40.0, 120.0, 60.0), (120.0, 300.0, 40.0)),
+            layers=((12.0, 40.0, 14.0), (40.0, 120.0, 7.0), (120.0, 300.0, 2.0)),
             surfaces=RoadStyle(edge_lines=True, zebra=False, road="asphalt/new"),
         ),
     }
@@ -471,4 +471,4 @@ def _layers(site: _Site) -> None:
             site.put(name, asset, "vegetation", point, rng.uniform(0.0, 2 * math.pi), size_m=trunk)
 
 
-_MOST_PLANTS: Final = 4000
+_MOST_PLANTS: Final = 2000
