@@ -101,7 +101,9 @@ def ground_plan(network: RoadNetwork) -> GroundPlan:
     areas = [lane.centre_m[:, :2] for lane in network.of_kind("walking_area") if len(lane.centre_m) > 2]
     walked += [shapely.Polygon(outline).buffer(0) for outline in areas]
     crossings = shapely.union_all([_strip(lane) for lane in network.of_kind("crossing")])
-    walk = _closed(shapely.union_all(walked)).difference(crossings)
+    # Where nobody may cross, SUMO's walking areas go on over the road.
+    ways = [*driven, *(_strip(lane) for lane in network.of_kind("internal"))]
+    walk = _closed(shapely.union_all(walked)).difference(shapely.union_all([crossings, *ways]))
     carriageway = _closed(shapely.union_all([*driven, *junctions, crossings])).difference(walk)
     return GroundPlan(carriageway, walk, crossings, _Heights(network))
 
@@ -116,12 +118,15 @@ def road_surfaces(
     )
     outer = shapely.box(*plan.carriageway.union(plan.walk).bounds).buffer(margin_m, join_style="mitre")
     ground = outer.difference(shapely.union_all([plan.carriageway, plan.walk]).buffer(0.01))
+    # Beside pavements the ground is nearly as high as they are, beside bare roads nearly as low.
+    terrain_m = KERB_HEIGHT_M - 0.03 if not plan.walk.is_empty else 0.01
     surfaces = [
         _flat("road", style.road, plan.carriageway, heights, 0.0),
         _flat("sidewalk", style.walk, plan.walk.difference(kerb), heights, KERB_HEIGHT_M),
         _flat("kerb", style.kerb, kerb, heights, KERB_HEIGHT_M),
         _walls("kerb", style.kerb, plan.walk, heights, KERB_HEIGHT_M),
-        _flat("terrain", style.ground, ground, heights, KERB_HEIGHT_M - 0.03),
+        _flat("terrain", style.ground, ground, heights, terrain_m),
+        _walls("terrain", style.ground, ground, heights, terrain_m),
         _ribbons("marking", style.mark, _marks(network, style)),
     ]
     merged: dict[tuple[str, str], list[RoadSurface]] = {}
