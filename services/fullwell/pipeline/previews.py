@@ -95,19 +95,19 @@ def render_previews(
             _run(
                 document,
                 store,
-                f"{prefix}/work/{name}",
+                f"{prefix}/under-way/{name}",
                 runner=runner,
                 assets=assets,
                 should_cancel=should_cancel,
                 progress=_part(report, number),
             )
-    views = [_picture(store, f"{prefix}/work/views/view_{number}/image.png") for number in range(VIEWS)]
-    balls = None if steps[1] is None else _picture(store, f"{prefix}/work/materials/image.png")
+    views = [_picture(store, f"{prefix}/under-way/views/view_{number}/image.png") for number in range(VIEWS)]
+    balls = None if steps[1] is None else _picture(store, f"{prefix}/under-way/materials/image.png")
     pictures = {f"view_{number}": view for number, view in enumerate(views)}
     pictures |= {"thumb": views[0], "turntable": _sheet(views), "chart": materials_chart(manifest, balls)}
     for name, key in zip(PREVIEW_NAMES, keys, strict=True):
         store.put(key, _png(pictures[name]), "image/png")
-    store.delete_prefix(f"{prefix}/work/")
+    store.delete_prefix(f"{prefix}/under-way/")
     return keys
 
 

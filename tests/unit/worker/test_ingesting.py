@@ -86,7 +86,7 @@ def test_an_asset_without_pictures_is_an_asset_and_the_record_says_why(bench: Be
     assert (done.state, done.error, done.preview_error) == ("done", None, "the frame needs more memory")
     assert done.stored is not None
     look = bench.context.library.get("car").manifest.look_digest
-    assert bench.renderer.asked == [f"assets/previews/{look}/work/views"]
+    assert bench.renderer.asked == [f"assets/previews/{look}/under-way/views"]
     assert bench.context.library.get("car").created_by == "ann"
 
 
