@@ -198,7 +198,7 @@ class Street:
         return StreetMoment(frame.time_s, (*movers, *kept), frame.signals, tuple(notes) + self.run.warnings[:8])
 
     def _movers(self, frame: TrafficFrame) -> tuple[list[PlacedAsset], list[str]]:
-        taken, placed, dropped = Footprints(), [], 0
+        taken, placed, dropped, swinging = Footprints(), [], 0, 0
         for mover in frame.movers:
             asset = self._asset_of(mover)
             if asset is None:
@@ -206,12 +206,25 @@ class Street:
                     f"{self._path}: there is no asset for a {mover.kind} ({mover.id}). Approve or import one.", self._path
                 )
             item = self._placed(mover, asset)
+            if not self._houses.is_free(footprint(item.position_m, item.yaw_rad, _body(asset))):
+                swinging += 1  # the tail of a long vehicle that SUMO turns about its front
+                continue
             if taken.claim(footprint(item.position_m, item.yaw_rad, _body(asset))):
                 placed.append(item)
             else:
                 dropped += 1
         notes = [f"{dropped} movers overlapped others in SUMO's own positions and were left out."] if dropped else []
+        if swinging:
+            notes.append(f"{swinging} long vehicles would have swung into buildings and were left out.")
         return placed, notes
+
+    @cached_property
+    def _houses(self) -> Footprints:
+        taken = Footprints()
+        for item in self.standing:
+            if item.role == "building":
+                taken.take(item.outline())
+        return taken
 
     def _asset_of(self, mover: Mover) -> AssetManifest | None:
         choices = [asset for name in TRAFFIC_CLASSES[mover.kind] for asset in self._shelf.all(name)]
