@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -106,12 +109,19 @@ def test_same_bytes_for_one_thread_and_for_four() -> None:
 
 
 def test_scenes_of_one_kind_share_recordings_but_nothing_else() -> None:
+    """As in a worker, which renders one job after the other: what other tests have left in this process is no part of it."""
+    here = Path(__file__).resolve()
+    paths = [str(here.parent), str(here.parents[2]), str(here.parents[2] / "service")]
+    code = f"import sys; sys.path[:0] = {paths!r}; import test_against_mitsuba; test_against_mitsuba.check_sharing()"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+
+
+def check_sharing() -> None:
     """Dr.Jit makes two recordings of whatever it sees first."""
     full = replace(SCENES["diffuse_box"](), samples=8)
     bare = replace(full, scene=SceneDescription((*box()[1:4], ceiling_lamp(0.3))))
     first = [our_image(comparison, 0) for comparison in (full, bare, full, bare)]
-    for comparison in (full, bare):  # what another test of this process has recorded may be seen for the second time now
-        our_image(comparison, 0)
     before = recordings()
     again = [our_image(comparison, 0) for comparison in (bare, full)]
     assert recordings() == before
