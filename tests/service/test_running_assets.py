@@ -24,7 +24,7 @@ from fullwell.core.settings import Settings
 from fullwell.jobs.queue import CeleryTaskQueue
 from servers import S3Server, ValkeyServer
 
-pytestmark = pytest.mark.service
+pytestmark = [pytest.mark.service, pytest.mark.slow]
 
 CAR: dict[str, Any] = {"asset_class": "car", "licence": "CC0-1.0", "forward_axis": "z"}
 PATIENCE_S = 120.0

@@ -21,7 +21,7 @@ from fullwell.jobs.queue import CeleryTaskQueue
 from fullwell.storage import store_from_url
 from servers import S3Server, ValkeyServer, free_port, start_valkey_server
 
-pytestmark = pytest.mark.service
+pytestmark = [pytest.mark.service, pytest.mark.slow]
 
 SLOW = {"quality": {"samples_per_pixel": 512, "max_depth": 3}}
 """About a second for each frame: long enough to be killed in the middle."""

@@ -21,7 +21,7 @@ from fullwell.core import ServiceError
 from fullwell.jobs.embedded import ServiceInfo, hold_home, publish_service, running_service
 from servers import missing
 
-pytestmark = pytest.mark.service
+pytestmark = [pytest.mark.service, pytest.mark.slow]
 
 
 def fullwell(home: Path, *arguments: str, seconds: float = 60.0) -> subprocess.CompletedProcess[str]:
