@@ -1,8 +1,8 @@
 """Cones, barriers, and what stands about in streets: pallets, boxes, skips, planters, hydrants, bollards.
 
 Cones of 0.5 and 0.75 m with two retroreflective sleeves (EN 13422:2019); a concrete barrier of New Jersey profile, 0.81 m
-high and 0.61 m wide at its foot, whose slopes break 75 and 330 mm above the road (FHWA, Technical Advisory T 5040.x, as in
-AASHTO, Roadside Design Guide, 4th ed., fig. 6-8); the pallet is the EUR 1 of EN 13698-1 (1200 x 800 x 144 mm); the skip has
+high and 0.61 m wide at its foot, whose slopes break 75 and 330 mm above the road (after AASHTO,
+Roadside Design Guide); the pallet is the EUR 1 of EN 13698-1 (1200 x 800 x 144 mm); the skip has
 the outline of a 6 cubic yard builder's skip (DIN 30720-1).
 """
 
