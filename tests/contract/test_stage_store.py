@@ -204,11 +204,11 @@ def test_entry_above_the_limit_is_not_kept(store: ObjectStore) -> None:
 
 
 def test_readers_writers_and_sweepers_at_once_see_whole_entries_or_none(store: ObjectStore) -> None:
-    """Each thread is a worker of its own; the limit holds six in ten of what they use, so entries vanish all the time."""
+    """Each thread is a worker of its own; the limit holds a quarter of what they use, so entries vanish all the time."""
 
     def work(worker: int) -> tuple[int, int]:
-        stages, hits, wrong = StageStore(store, max_bytes=120_000, touch_s=0.01), 0, 0
-        for step in range(40):
+        stages, hits, wrong = StageStore(store, max_bytes=50_000, touch_s=0.01), 0, 0
+        for step in range(160):
             number = (step * 7 + worker * 3) % 20
             found = stages.get("radiance", key_of(number))
             if found is None:
@@ -222,5 +222,5 @@ def test_readers_writers_and_sweepers_at_once_see_whole_entries_or_none(store: O
         done = list(pool.map(work, range(4)))
     assert sum(wrong for _, wrong in done) == 0
     assert sum(hits for hits, _ in done) > 0
-    StageStore(store, max_bytes=120_000).sweep()
-    assert sum(info.size for info in store.list("cache/")) <= 120_000
+    StageStore(store, max_bytes=50_000).sweep()
+    assert sum(info.size for info in store.list("cache/")) <= 50_000

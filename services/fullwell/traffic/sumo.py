@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import resource
 import subprocess
 from collections.abc import Sequence
@@ -15,7 +14,7 @@ from typing import Final
 
 from fullwell.core.errors import FieldError
 
-__all__ = ["SumoLimits", "TrafficError", "run_sumo_program", "sumo_home", "sumo_version"]
+__all__ = ["SumoLimits", "TrafficError", "run_sumo_program", "sumo_home"]
 
 _SHOWN_LINES: Final = 4
 _MIB: Final = 1 << 20
@@ -42,16 +41,6 @@ def sumo_home() -> Path:
         if (Path(place) / "bin").is_dir():
             return Path(place)
     raise TrafficError("SUMO is not installed. Install fullwell[traffic].", "scene.traffic")
-
-
-@cache
-def sumo_version() -> str:
-    """Return the version of the installed SUMO, as it prints it: networks and runs of another one may differ."""
-    told = subprocess.run(
-        [str(sumo_home() / "bin" / "sumo"), "--version"], capture_output=True, text=True, check=False, timeout=60
-    )
-    match = re.search(r"Version\s+(\S+)", told.stdout)
-    return match[1] if match else "unknown"
 
 
 def run_sumo_program(
