@@ -227,11 +227,12 @@ def test_a_dropped_model_is_previewed_approved_by_keyboard_and_drawn_by_a_recipe
 
 def approved(page: Page) -> None:
     """Wait for an approval; give a reason where a check asks for one."""
-    page.locator(".q-notification, .fw-dialog").first.wait_for()
+    told = page.locator(".q-notification").get_by_text("Approved")
+    told.or_(page.locator(".fw-dialog")).first.wait_for()
     if page.locator(".fw-dialog").count():
         page.get_by_label("Reason").fill("Measured against its drawing.")
         page.locator(".fw-dialog").get_by_role("button", name="Approve").click()
-    page.locator(".q-notification").get_by_text("Approved").wait_for()
+    told.first.wait_for()
 
 
 def test_a_file_that_is_no_model_is_refused_with_its_reason(browser: Browser, tmp_path: Path) -> None:
@@ -420,7 +421,7 @@ def test_a_phone_shows_everything_in_one_column(browser: Browser, cars: tuple[st
         page.locator(".fw-card-open").first.click()
         page.locator(".fw-stage canvas").wait_for()
         assert page.evaluate("document.documentElement.scrollWidth") == 390
-        assert page.get_by_role("button", name="Approve").is_visible()
+        assert page.locator(".fw-decision").get_by_role("button", name="Approve").is_visible()
 
 
 def test_the_theme_follows_the_system_and_can_be_switched(browser: Browser, cars: tuple[str, AssetLibrary]) -> None:
@@ -463,7 +464,7 @@ def test_a_key_decides_who_sees_and_who_changes(browser: Browser, tmp_path: Path
         assert page.get_by_role("button", name="Import").is_disabled()
         assert "may look only" in str(page.get_by_role("button", name="Import").get_attribute("title"))
         page.locator(".fw-card-open").click()
-        assert page.get_by_role("button", name="Approve").is_disabled()
+        assert page.locator(".fw-decision").get_by_role("button", name="Approve").is_disabled()
         page.keyboard.press("a")
         page.get_by_text("may look only").first.wait_for()
 
