@@ -214,7 +214,7 @@ def render_light(
 
 
 def weighted_groups(replicas: NDArray[np.floating], weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return (replicas, channels, rows, cols) of (replicas, groups, channels, rows, cols) of light, each group times its weight.
+    """Return (replicas, channels, rows, cols) sums over the groups of (replicas, groups, channels, rows, cols), weighted.
 
     Group by group: a dot product over the second axis would copy everything twice before it begins.
     """
