@@ -264,7 +264,10 @@ class ImageEnvironment:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SunSky:
-    """Sun and clear sky in absolute units. `sun_direction` points from the scene to the sun, above the horizon."""
+    """Sun and clear sky in absolute units. `sun_direction` points from the scene to the sun, not below the horizon.
+
+    `group` is the light group of the sky, `sun_group` that of the sun's disk; the sky's where it is empty.
+    """
 
     sun_direction: tuple[float, float, float]
     turbidity: float = 3.0
@@ -272,6 +275,7 @@ class SunSky:
     sun_weight: float = 1.0
     sky_weight: float = 1.0
     group: str = "default"
+    sun_group: str = ""
 
 
 @dataclass(frozen=True, slots=True)

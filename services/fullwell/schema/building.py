@@ -309,8 +309,11 @@ def _check_light_groups(recipe: RecipeDocument, placed: PlacedScene) -> None:
     from fullwell.core.errors import unknown_name_message  # noqa: PLC0415
     from fullwell.scene.groups import group_names  # noqa: PLC0415
     from fullwell.schema.conversion.context import fail  # noqa: PLC0415
+    from fullwell.schema.conversion.traffic import STREET_GROUPS  # noqa: PLC0415
 
     known = group_names(placed.description)
+    if recipe.scene.traffic is not None:  # whatever is lit at the moment of the frame
+        known = tuple(sorted({*known, *STREET_GROUPS}))
     for name in recipe.scene.light_groups:
         if name not in known:
             fail(f"scene.light_groups.{name}", unknown_name_message("light group", name, known), name)

@@ -279,7 +279,7 @@ class SunOnDevice:
         self.solid_angle_sr = float(2.0 * np.pi * opening)
         self._opening, self._chord2 = dr.opaque(mi.Float, opening), dr.opaque(mi.Float, 2.0 * opening)
         self._inverse_sr = dr.opaque(mi.Float, 1.0 / self.solid_angle_sr)
-        self._row = dr.opaque(mi.UInt32, sun.row)
+        self.row = dr.opaque(mi.UInt32, sun.row)
 
     def sample(self, u: Any) -> Any:
         """Return a direction uniform over the disk."""
@@ -301,4 +301,4 @@ class SunOnDevice:
 
     def radiance(self, spectra_device: Any, direction: Any, cells: list[Any]) -> Any:
         """Return the disk's radiance, 0 beside it."""
-        return self._dr.select(self.holds(direction), look_up(self._mi, spectra_device, self._row, cells), 0.0)
+        return self._dr.select(self.holds(direction), look_up(self._mi, spectra_device, self.row, cells), 0.0)

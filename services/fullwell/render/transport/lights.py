@@ -35,6 +35,7 @@ from fullwell.scene import (
     SpotLight,
     SunSky,
 )
+from fullwell.scene.groups import sun_group
 
 __all__ = ["LightSample", "LightSet"]
 
@@ -161,7 +162,9 @@ class LightSet:
         if collected.sun is not None and collected.power(collected.sun.row) > 0:
             features.add("sun")
             self._sun = SunOnDevice(mi, collected.sun)
-            irradiance["sun"] = collected.power(collected.sun.row) * self._sun.solid_angle_sr * importance / 4.0
+            self._sun_group = dr.opaque(mi.UInt32, collected.sun_group)
+            power = collected.power(collected.sun.row) * collected.sun_weight
+            irradiance["sun"] = power * self._sun.solid_angle_sr / 4.0
         self.count += len(features & {"environment", "sun"})
 
     def _set_distant(self, distant: list[_Distant]) -> float:
@@ -260,21 +263,22 @@ class LightSet:
             direction = dr.select(set_, about, mi.warp.square_to_uniform_sphere(u))
         else:
             direction, _ = self._map.sample(u, active)
-        return self._from_far(normal, direction, active)
+        density = self._environment_density(normal, direction, active)
+        return self._from_far(direction, density, self._environment_group, 0, dome=True)
 
     def _sample_sun(self, point: Any, normal: Any, u_select: Any, u: Any, active: Any) -> LightSample:
-        return self._from_far(normal, self._sun.sample(u), active)
+        direction = self._sun.sample(u)
+        density = self._sun_density(direction, active)
+        return self._from_far(direction, density, self._sun_group, self._sun.row, dome=False)
 
-    def _from_far(self, normal: Any, direction: Any, active: Any) -> LightSample:
-        """Return the sample of a direction without end, with what sky and sun together send from it."""
+    def _from_far(self, direction: Any, pdf: Any, group: Any, row: Any, *, dome: bool) -> LightSample:
+        """Return the sample of a direction without end to the environment (`dome`), or to the sun with its spectrum's row."""
         mi, dr = self._mi, self._dr
         width = dr.width(direction.x)
-        pdf = self.escaped_density(normal, direction, active)
         none, far = dr.zeros(mi.UInt32, width), dr.full(mi.Float, dr.inf, width)
-        group = none + self._environment_group
         ones = dr.full(mi.Float, 1.0, width)
-        no, yes, nothing = dr.zeros(mi.Bool, width), dr.full(mi.Bool, True, width), dr.zeros(mi.Vector3f, width)
-        return LightSample(direction, far, nothing, pdf, no, group, none, ones, yes, self)
+        no, nothing, of_dome = dr.zeros(mi.Bool, width), dr.zeros(mi.Vector3f, width), dr.full(mi.Bool, dome, width)
+        return LightSample(direction, far, nothing, pdf, no, none + group, none + row, ones, of_dome, self)
 
     def _sample_distant(self, point: Any, normal: Any, u_select: Any, u: Any, active: Any) -> LightSample:
         mi, dr = self._mi, self._dr
@@ -304,8 +308,8 @@ class LightSet:
     def _radiance(self, sample: LightSample, spectra_device: Any, cells: list[Any]) -> Any:
         dr = self._dr
         value = look_up(self._mi, spectra_device, sample._row, cells) * sample._scale
-        if self.features & {"environment", "sun"}:
-            far = self._far_radiance(spectra_device, sample.direction, cells, sample._dome & (sample.pdf > 0))
+        if "environment" in self.features:
+            far = self._dome_radiance(spectra_device, sample.direction, cells, sample._dome & (sample.pdf > 0))
             value = dr.select(sample._dome, far, value)
         return dr.select(sample.pdf > 0, value, 0.0)
 
@@ -335,36 +339,42 @@ class LightSet:
             density = dr.select(self._leaves.is_curved(leaf), curved, density)
         return dr.select(active & (probability > 0), density * probability * self._share["tree"], 0.0)
 
-    def escaped(self, spectra_device: Any, direction: Any, cells: list[Any], active: Any) -> list[tuple[Any, Any]]:
-        """Return [(radiance, group)] of what a ray that leaves the scene meets: environment and sun; [] without any."""
-        if not self.features & {"environment", "sun"}:
-            return []
-        radiance = self._far_radiance(spectra_device, direction, cells, active)
-        return [(self._dr.select(active, radiance, 0.0), self._environment_group)]
+    def escaped(
+        self, spectra_device: Any, origin_normal: Any, direction: Any, cells: list[Any], active: Any
+    ) -> list[tuple[Any, Any, Any]]:
+        """Return [(radiance, density [sr^-1], group)] of what a ray that leaves the scene meets, [] without anything.
 
-    def _far_radiance(self, spectra_device: Any, direction: Any, cells: list[Any], active: Any) -> Any:
-        parts = []
-        if "dome" in self.features:
-            parts.append(look_up(self._mi, spectra_device, self._dome_row, cells))
-        elif "environment" in self.features:
-            parts.append(self._map.radiance(spectra_device, direction, cells, active))
+        Environment and sun are two lights, each with the density with which `sample` at a point of that normal would have
+        chosen the direction for it.
+        """
+        dr = self._dr
+        met = []
+        if "environment" in self.features:
+            radiance = self._dome_radiance(spectra_device, direction, cells, active)
+            density = self._environment_density(origin_normal, direction, active)
+            met.append((dr.select(active, radiance, 0.0), density, self._environment_group))
         if "sun" in self.features:
-            parts.append(self._sun.radiance(spectra_device, direction, cells))
-        return sum(parts[1:], parts[0])
+            radiance = self._sun.radiance(spectra_device, direction, cells)
+            met.append((dr.select(active, radiance, 0.0), self._sun_density(direction, active), self._sun_group))
+        return met
 
-    def escaped_density(self, origin_normal: Any, direction: Any, active: Any) -> Any:
-        """Return the density [sr^-1] with which `sample` chooses a direction, by environment and sun together."""
-        mi, dr = self._mi, self._dr
-        density = dr.zeros(mi.Float, dr.width(direction.x))
+    def _dome_radiance(self, spectra_device: Any, direction: Any, cells: list[Any], active: Any) -> Any:
+        if "dome" in self.features:
+            return look_up(self._mi, spectra_device, self._dome_row, cells)
+        return self._map.radiance(spectra_device, direction, cells, active)
+
+    def _environment_density(self, origin_normal: Any, direction: Any, active: Any) -> Any:
+        dr = self._dr
         if "dome" in self.features:
             bound = dr.dot(origin_normal, origin_normal) > _NORMAL_SET
             cosine = dr.maximum(dr.dot(origin_normal, direction), 0.0)
-            density += self._share["environment"] * dr.select(bound, cosine / np.pi, 0.25 / np.pi)
-        elif "environment" in self.features:
-            density += self._share["environment"] * self._map.density(direction, active)
-        if "sun" in self.features:
-            density += self._share["sun"] * self._sun.density(direction)
-        return dr.select(active, density, 0.0)
+            density = dr.select(bound, cosine / np.pi, 0.25 / np.pi)
+        else:
+            density = self._map.density(direction, active)
+        return dr.select(active, self._share["environment"] * density, 0.0)
+
+    def _sun_density(self, direction: Any, active: Any) -> Any:
+        return self._dr.select(active, self._share["sun"] * self._sun.density(direction), 0.0)
 
 
 def _take(dr: Any, found: LightSample, other: LightSample, chosen: Any) -> None:
@@ -436,8 +446,8 @@ class _Collected:
         self.map: DomeMap | None = None
         self.sun: SunDisk | None = None
         self.dome_row: int | None = None
-        self.environment_group = 0
-        self.environment_weight = 1.0
+        self.environment_group = self.sun_group = 0
+        self.environment_weight = self.sun_weight = 1.0
         for light in lights:
             self._add_far(light)
 
@@ -528,6 +538,8 @@ class _Collected:
                 self.map = image_map(light, self._spectra)
             case SunSky():
                 self.map, self.sun = sun_and_sky(light, self._spectra)
+                self.sun_group = self._group(sun_group(light))
+                self.sun_weight = float(self._group_weights[self.sun_group])
             case _:
                 return
         self.environment_group = self._group(light.group)

@@ -272,9 +272,9 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
         if not self._lights.features.isdisjoint(("environment", "sun")):
             escaped = active & ~hit.valid & ~in_fog
             if escaped:
-                other = self._lights.escaped_density(last_normal, direction, escaped & (last_density > 0))
-                share = dr.select(last_density > 0, last_density / (last_density + other), 1.0)
-                for value, group in self._lights.escaped(given.tables["spectra"], direction, cell_list, escaped):
+                met = self._lights.escaped(given.tables["spectra"], last_normal, direction, cell_list, escaped)
+                for value, other, group in met:
+                    share = dr.select(last_density > 0, last_density / (last_density + other), 1.0)
                     radiance = self._added(radiance, throughput * value * share, group)
 
         depth += 1

@@ -145,6 +145,7 @@ def _sun_sky(document: documents.SunSkyLight, path: str, context: Context) -> Su
         document.sun_weight,
         document.sky_weight,
         group=document.group,
+        sun_group=document.sun_group or "",
     )
 
 

@@ -26,9 +26,12 @@ if TYPE_CHECKING:
     from fullwell.traffic.placement import AssetShelf, PlacedAsset
     from fullwell.traffic.street import Street, StreetMoment, StreetSpec
 
-__all__ = ["StreetView", "Viewpoint", "mount_pose", "street_objects", "street_view"]
+__all__ = ["STREET_GROUPS", "StreetView", "Viewpoint", "mount_pose", "street_objects", "street_view"]
 
 Array = NDArray[np.float64]
+
+STREET_GROUPS: Final = ("headlights", "other", "streetlights")
+"""Light groups of a street's own lamps: a recipe may weight them whether or not one is lit at its moment."""
 
 _KEPT_STREETS: Final = 4
 _LOOK_AHEAD_S: Final = 0.1

@@ -157,7 +157,8 @@ class SunSkyLight(_Light):
     """Sun and clear sky in absolute units (x = east, y = north, z = up).
 
     The sun's place is either given by elevation and azimuth (clockwise from north) or computed from `time_utc`
-    ("2024-06-21T10:30:00Z"), `latitude_deg` and `longitude_deg` (east positive).
+    ("2024-06-21T10:30:00Z"), `latitude_deg` and `longitude_deg` (east positive). `sun_group` is the light group of the sun's
+    disk, where it is not that of the sky.
     """
 
     kind: Literal["sun_sky"]
@@ -168,6 +169,7 @@ class SunSkyLight(_Light):
     longitude_deg: Annotated[float, Range(ge=-180, le=180)] | None = None
     turbidity: Annotated[float, Range(ge=1, le=10)] = 3.0
     ground_albedo: Fraction = 0.2
+    sun_group: Group | None = None
     sun_weight: NonNegative = 1.0
     sky_weight: NonNegative = 1.0
 

@@ -46,18 +46,25 @@ def sphere_of_directions(count: int) -> np.ndarray:
     return np.stack([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z], axis=1)
 
 
-def escaped(lit: Lit, directions: np.ndarray, cell: int = CELL) -> np.ndarray:
-    """Radiance of what rays meet outside the scene."""
+def met(lit: Lit, directions: np.ndarray, cell: int = CELL, normal=NO_NORMAL) -> list[tuple[np.ndarray, np.ndarray, int]]:
+    """(radiance, density, group) of each light that rays meet outside the scene."""
     lanes = len(directions)
     cells = [lit.mi.UInt32(np.full(lanes, cell, np.uint32))]
-    ((radiance, _),) = lit.lights.escaped(lit.spectra, lit.vector(directions, lanes), cells, lit.all_lanes(lanes))
-    return np.asarray(radiance[0].numpy(), dtype=float)
+    towards = lit.vector(directions, lanes)
+    parts = lit.lights.escaped(lit.spectra, lit.vector(normal, lanes), towards, cells, lit.all_lanes(lanes))
+    return [
+        (np.asarray(radiance[0].numpy(), dtype=float), np.asarray(density.numpy(), dtype=float), int(group.numpy()[0]))
+        for radiance, density, group in parts
+    ]
+
+
+def escaped(lit: Lit, directions: np.ndarray, cell: int = CELL) -> np.ndarray:
+    """Radiance of what rays meet outside the scene."""
+    return sum(radiance for radiance, _, _ in met(lit, directions, cell))
 
 
 def density(lit: Lit, directions: np.ndarray, normal=NO_NORMAL) -> np.ndarray:
-    lanes = len(directions)
-    found = lit.lights.escaped_density(lit.vector(normal, lanes), lit.vector(directions, lanes), lit.all_lanes(lanes))
-    return np.asarray(found.numpy(), dtype=float)
+    return sum(part for _, part, _ in met(lit, directions, normal=normal))
 
 
 def hilly(rows: int = 24, cols: int = 50) -> np.ndarray:
@@ -195,17 +202,25 @@ def test_sky_gives_the_irradiance_of_its_map(mi) -> None:
     assert np.all(escaped(lit, sphere_of_directions(4096) * [1, 1, -1])[:2048] == 0)
 
 
-def test_sun_and_sky_are_one_density_and_one_radiance(mi) -> None:
-    lit = Lit.of(mi, lamps(rectangle(0.5, 2.0)), [SunSky(SUN, sun_weight=2.0, sky_weight=0.5)])
+@pytest.mark.parametrize("sun_group", ["", "sun"])
+def test_sun_and_sky_are_two_lights_each_with_its_density(mi, sun_group: str) -> None:
+    light = SunSky(SUN, sun_weight=2.0, sky_weight=0.5, sun_group=sun_group)
+    lit = Lit.of(mi, lamps(rectangle(0.5, 2.0), groups=("default", "sun")), [light])
     assert lit.lights.features == {"tree", "environment", "sun"}
     sample = lit.sample((0, 0, 0), UP, 2**14)
-    far = np.isinf(sample.distance.numpy())
+    far, of_dome = np.isinf(sample.distance.numpy()), sample._dome.numpy()
     directions = sample.direction.numpy().T.astype(float)
-    assert density(lit, directions, UP)[far] == pytest.approx(sample.pdf.numpy()[far], rel=1e-3)
-    assert escaped(lit, directions)[far] == pytest.approx(lit.radiance(sample)[far], rel=1e-4)
-    sun = np.array(SUN) / np.linalg.norm(SUN)
-    beside = sun + 0.02 * np.cross(sun, [0.0, 0.0, 1.0])
-    assert escaped(lit, sun[None])[0] > 1000 * escaped(lit, beside[None] / np.linalg.norm(beside))[0]
+    sky, sun = met(lit, directions, normal=UP)
+    groups = sample.group.numpy()
+    for (radiance, part, group), chosen in ((sky, far & of_dome), (sun, far & ~of_dome)):
+        assert np.count_nonzero(chosen) > 500
+        assert part[chosen] == pytest.approx(sample.pdf.numpy()[chosen], rel=1e-3)
+        assert radiance[chosen] == pytest.approx(lit.radiance(sample)[chosen], rel=1e-4)
+        assert np.all(groups[chosen] == group)
+    assert (sky[2] != sun[2]) == bool(sun_group)
+    towards = np.array(SUN) / np.linalg.norm(SUN)
+    beside = towards + 0.02 * np.cross(towards, [0.0, 0.0, 1.0])
+    assert escaped(lit, towards[None])[0] > 1000 * escaped(lit, beside[None] / np.linalg.norm(beside))[0]
     parts = [
         Lit.of(mi, lamps(), [SunSky(SUN, sun_weight=2.0, sky_weight=0.0)]).irradiance((0, 0, 0)),
         Lit.of(mi, lamps(), [SunSky(SUN, sun_weight=0.0, sky_weight=0.5)]).irradiance((0, 0, 0), lanes=2**18),

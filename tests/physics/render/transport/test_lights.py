@@ -361,7 +361,9 @@ def test_no_lights_at_all_give_densities_of_zero(mi) -> None:
     assert lit.lights.features == frozenset()
     assert lit.lights.count == 0
     assert np.all(lit.sample((0, 0, 0), UP, 16).pdf.numpy() == 0)
-    assert lit.lights.escaped(lit.spectra, lit.vector(UP, 16), [mi.UInt32([0] * 16)], lit.all_lanes(16)) == []
+    assert (
+        lit.lights.escaped(lit.spectra, lit.vector(UP, 16), lit.vector(UP, 16), [mi.UInt32([0] * 16)], lit.all_lanes(16)) == []
+    )
 
 
 def test_group_weights_move_choices_and_not_results(mi) -> None:
