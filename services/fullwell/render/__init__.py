@@ -1,6 +1,7 @@
 """The renderer behind one door: light through a camera, and surface queries. Importing this package does not load Mitsuba."""
 
 from fullwell.render.adaptive import NoiseTarget, SamplingGoal, tile_errors
+from fullwell.render.exposure_moments import MotionRequest, count_moments
 from fullwell.render.light import LightRequest, RenderedLight, RenderStatistics, render_light
 from fullwell.render.radiance import render_radiance
 from fullwell.render.surfaces import query_depth, query_surfaces
@@ -10,6 +11,7 @@ from fullwell.render.variant import VariantChoice, activate, choose_variant
 __all__ = [
     "REPLICAS",
     "LightRequest",
+    "MotionRequest",
     "NoiseTarget",
     "RenderStatistics",
     "RenderedLight",
@@ -17,6 +19,7 @@ __all__ = [
     "VariantChoice",
     "activate",
     "choose_variant",
+    "count_moments",
     "query_depth",
     "query_surfaces",
     "render_light",

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fullwell.core.errors import FullwellError, RenderError
+from fullwell.core.errors import FieldError, FullwellError, RenderError
+from fullwell.core.rng import seed32
 from fullwell.radiometry import RadianceImage, Spectrum, WavelengthGrid
 from fullwell.render.adaptive import NoiseTarget, SamplingGoal, SamplingOutcome, sample_until
+from fullwell.render.exposure_moments import MotionRequest, cut_exposure
 from fullwell.render.scalar import ScalarImage
+from fullwell.render.transport.moments import Moments
 from fullwell.render.transport.progressive import REPLICAS, ProgressiveImage, Reporter, Work
 from fullwell.render.variant import activate
 from fullwell.scene import Camera, SceneDescription
@@ -35,6 +39,9 @@ class RenderStatistics:
         Samples that were no numbers and count as black; rays between two surfaces that were traced.
     clamped_fraction
         Share of the channels' light that a clamp of single samples took away; 0 without one.
+    moments, moment_step_px, exposure_time_s
+        Moments that the exposure was cut into, 1 where nothing moved; how far anything moves in one, at most, in film samples,
+        -1 where that is not known; and the exposure time of a row that the motion was rendered for [s], 0 without motion.
     wall_s, cpu_s
         Time, all threads' for `cpu_s`.
     variant
@@ -60,6 +67,9 @@ class RenderStatistics:
     unmet_tiles: int = 0
     stopped_by: str = "samples"
     clamped_fraction: float = 0.0
+    moments: int = 1
+    moment_step_px: float = 0.0
+    exposure_time_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,6 +93,8 @@ class LightRequest:
         at the light; groups left out have weight 1. Without any, every pixel gets equal samples.
     seed
         The same seed gives the same bytes, for any number of threads.
+    motion
+        What moves while the film is exposed; None: nothing.
     """
 
     grid: WavelengthGrid
@@ -94,6 +106,7 @@ class LightRequest:
     goal: SamplingGoal = field(default_factory=SamplingGoal)
     targets: tuple[tuple[tuple[tuple[str, float], ...], NoiseTarget], ...] = ()
     seed: int = 0
+    motion: MotionRequest | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -194,6 +207,8 @@ def render_light(
     )
     report = Reporter(progress, should_cancel)
     try:
+        motion = _Exposure() if request.motion is None else _exposed(mi, work, request.motion, report)
+        work = replace(work, moments=motion.moments)
         image = ProgressiveImage(mi, work) if mi.variant().startswith("llvm") else ScalarImage(mi, work)
         views = [(_weights(image.groups, dict(by_name)), target) for by_name, target in request.targets]
         outcome = sample_until(image, request.goal, views, report=report, replicas=REPLICAS)
@@ -204,7 +219,12 @@ def render_light(
             groups=image.groups,
             grid=request.grid,
             tangent_pitch=camera.tangent_pitch,
-            statistics=_statistics(image, outcome, started, cpu_started, str(mi.variant())),
+            statistics=replace(
+                _statistics(image, outcome, started, cpu_started, str(mi.variant())),
+                moments=1 if motion.moments is None else motion.moments.count,
+                moment_step_px=motion.step_px,
+                exposure_time_s=motion.time_s,
+            ),
         )
     except FullwellError:
         raise
@@ -230,6 +250,40 @@ def _standard_error(light: NDArray[np.float64]) -> NDArray[np.float64]:
     away = light - light.mean(axis=0)
     away *= away
     return np.asarray(np.sqrt(away.sum(axis=0) / (len(light) * (len(light) - 1))))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Exposure:
+    """Moments (None: nothing moves far enough), shift in each, and exposure time."""
+
+    moments: Moments | None = None
+    step_px: float = 0.0
+    time_s: float = 0.0
+
+
+_METERING_SAMPLES = 4
+"""Of each replica, in the picture of the scene standing still that an automatic exposure is found from."""
+
+
+def _exposed(mi: Any, work: Work, request: MotionRequest, report: Reporter) -> _Exposure:
+    """Find the exposure time where it is automatic, and cut it into moments."""
+    if not str(mi.variant()).startswith("llvm"):
+        sentence = (
+            "motion needs the compiled renderer; set quality.motion_blur_px to more than anything moves, or install libLLVM."
+        )
+        raise FieldError(sentence, path="quality.motion_blur_px")
+    time_s = request.exposure_time_s
+    if callable(time_s):
+        report(0.0)
+        still = ProgressiveImage(mi, replace(work, keep_bands=False, seed=seed32(work.seed, "metering")))
+        still.add(np.arange(still.pixels), np.full(still.pixels, _METERING_SAMPLES), lambda _: report(0.0))
+        mean = still.replicas().mean(axis=0, dtype=np.float64)
+        time_s = time_s(np.tensordot(_weights(still.groups, request.group_weights), mean, axes=(0, 0)))
+    moments = cut_exposure(work.scene, work.camera, request, time_s)
+    if moments is None:
+        return _Exposure(time_s=time_s)
+    step_px = request.shift_px(time_s) / moments.count
+    return _Exposure(moments, step_px if np.isfinite(step_px) else -1.0, time_s)
 
 
 def _weights(groups: tuple[str, ...], by_name: Mapping[str, float]) -> NDArray[np.float64]:

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fullwell.scene import Camera
 
 __all__ = ["CameraRays"]
 
 
 class CameraRays:
-    """Rays of one camera in the active renderer's arrays, from the centre of the entrance pupil at the origin.
+    """Rays of one camera in the active renderer's arrays, in world axes about the point `centre_m`.
 
+    That point is the centre of the entrance pupil, unless it is given: a camera that moves shares it at all times.
     Film positions run from (0, 0) at the top-left corner [px]; pixel centres are at +0.5. All numbers of the camera go to
     the kernels as data: written into their code, another camera would compile another kernel.
     """
 
-    def __init__(self, mi: Any, camera: Camera) -> None:
+    def __init__(self, mi: Any, camera: Camera, centre_m: NDArray[np.float64] | None = None) -> None:
         import drjit as dr  # noqa: PLC0415 - the renderer is loaded late
 
         self._mi, self._dr = mi, dr
@@ -28,6 +32,8 @@ class CameraRays:
         self._pupil_radius_m = self._data(0.5 * camera.lens.pupil_diameter_m)
         self._nearness = self._data(1.0 / camera.lens.focus_distance_m)
         self._rotation = [[self._data(v) for v in row] for row in camera.camera_to_world[:3, :3]]
+        place = np.zeros(3) if centre_m is None else camera.camera_to_world[:3, 3] - centre_m
+        self._place = mi.Point3f(*(self._data(v) for v in place))
 
     def _data(self, value: float) -> Any:
         return self._dr.opaque(self._mi.Float, float(value))
@@ -52,11 +58,12 @@ class CameraRays:
         """
         if self._pinhole:
             direction = self.chief(x_px, y_px)
-            return self._dr.zeros(self._mi.Point3f, self._dr.width(direction)), direction
+            return self._dr.zeros(self._mi.Point3f, self._dr.width(direction)) + self._place, direction
         x, y = self._tangents(x_px, y_px)
-        disk = self._mi.warp.square_to_uniform_disk_concentric(lens_uv) * self._pupil_radius_m
+        mi = self._mi
+        disk = mi.warp.square_to_uniform_disk_concentric(lens_uv) * self._pupil_radius_m
         # The point in focus is d * (x, y, 1); dividing the difference by d keeps a focus at infinity finite.
         dx, dy = x - disk.x * self._nearness, y - disk.y * self._nearness
         scale = self._dr.rsqrt(dx * dx + dy * dy + 1.0)
-        origin = self._to_world(disk.x, disk.y, self._mi.Float(0.0))
-        return self._mi.Point3f(origin), self._to_world(dx * scale, dy * scale, scale)
+        origin = self._to_world(disk.x, disk.y, mi.Float(0.0))
+        return mi.Point3f(self._place + origin), self._to_world(dx * scale, dy * scale, scale)

@@ -220,7 +220,8 @@ class PointLight:
 class SpotLight:
     """Radiant intensity [W sr^-1 nm^-1] on the axis, full within `beam_deg`, linear in angle to 0 at `cutoff_deg`.
 
-    Both are half angles from the axis, 0 < beam_deg < cutoff_deg < 90.
+    Both are half angles from the axis, 0 < beam_deg < cutoff_deg < 90. `carrier` is the id of the object, in the scene or left
+    out of it, that it moves with; "" stands still.
     """
 
     position_m: tuple[float, float, float]
@@ -229,6 +230,7 @@ class SpotLight:
     beam_deg: float
     cutoff_deg: float
     group: str = "default"
+    carrier: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -42,12 +42,27 @@ class Motion:
         cosine, sine = math.cos(angle), math.sin(angle)
         return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
+    @property
+    def moves(self) -> bool:
+        """Whether it does anything but rest."""
+        return bool(np.any(self.velocity_m_s)) or self.yaw_rate_rad_s != 0
+
+    def transform(self, interval_s: float) -> Array:
+        """Return the (4, 4) rigid transform of world points over an interval [s], which may be negative; see `shift_m`."""
+        matrix = np.eye(4)
+        matrix[:3, 3] = self.velocity_m_s * interval_s
+        if self.yaw_rate_rad_s != 0 and self.pivot_m is not None:
+            matrix[:3, :3] = self.turn(interval_s)
+            matrix[:3, 3] += self.pivot_m - matrix[:3, :3] @ self.pivot_m
+        return matrix
+
     def velocity_at(self, point_m: Array) -> Array:
-        """Return the velocity (3,) [m s^-1] of a point (3,) of the thing."""
+        """Return the velocity [m s^-1] of points (..., 3) of the thing, in the shape of the points."""
         if self.pivot_m is None:
-            return self.velocity_m_s
+            return np.broadcast_to(self.velocity_m_s, np.shape(point_m))
         arm = point_m - self.pivot_m
-        return np.asarray(self.velocity_m_s + self.yaw_rate_rad_s * np.array([-arm[1], arm[0], 0.0]))
+        across = np.stack([-arm[..., 1], arm[..., 0], np.zeros(arm.shape[:-1])], axis=-1)
+        return np.asarray(self.velocity_m_s + self.yaw_rate_rad_s * across)
 
     def shift_m(self, points_m: Array, interval_s: float) -> Array:
         """Return by how much (..., 3) the motion moves points (..., 3) within an interval [s], which may be negative."""

@@ -29,14 +29,21 @@ _ROULETTE_START = 2
 
 
 class Launch:
-    """The work of one launch, by lane: film sample `pixel`, sequence `seed`, samples [first, first + count) of it; and for
-    bands, the `offset` of each lane's first band.
+    """The work of one launch, by lane: film sample `pixel`, sequence `seed`, turns [first, first + count) of it; and for bands,
+    the `offset` of each lane's first band.
+
+    A turn is a sample of the sequence: each one, or with ``stride`` (of the tables) n every n-th, beginning with `residue`.
 
     Not a dataclass: Dr.Jit would take it for loop state.
     """
 
-    def __init__(self, pixel: Any, seed: Any, first: Any, count: Any, offset: Any) -> None:
+    def __init__(self, pixel: Any, seed: Any, first: Any, count: Any, offset: Any, residue: Any) -> None:  # noqa: PLR0917
         self.pixel, self.seed, self.first, self.count, self.offset = pixel, seed, first, count, offset
+        self.residue = residue
+
+    def sample(self, tables: Tables, turn: Any) -> Any:
+        """Return the number in the sequence of a turn."""
+        return turn * tables["stride"] + self.residue
 
 
 class _Inputs:
@@ -102,7 +109,7 @@ class PathLoop:
         """Return the sums of a launch.
 
         `tables` are those of the geometry with, beside them, ``spectra``, ``responses`` (channel, cell), ``slots``,
-        ``columns``, ``max_depth``, ``band_count``, ``band_first_nm`` and ``band_step_nm``.
+        ``columns``, ``stride``, ``max_depth``, ``band_count``, ``band_first_nm`` and ``band_step_nm``.
         """
         import drjit as dr  # noqa: PLC0415
 
@@ -209,9 +216,9 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
     def zeros() -> Any:
         return spectral([dr.zeros(mi.Float, lanes) for _ in range(count)])
 
-    sample = given.launch.first + dr.zeros(mi.UInt32, lanes)
-    end = sample + given.launch.count
-    active = sample < end
+    turn = given.launch.first + dr.zeros(mi.UInt32, lanes)
+    end = turn + given.launch.count
+    active = turn < end
     fresh = dr.full(mi.Mask, True, lanes)
     origin, direction = dr.zeros(mi.Point3f, lanes), dr.zeros(mi.Vector3f, lanes)
     cells = dr.llvm.ad.ArrayXu([dr.zeros(mi.UInt32, lanes) for _ in range(count)])
@@ -229,6 +236,7 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
     clamped = dr.zeros(mi.Float, lanes)
 
     while active:
+        sample = given.launch.sample(given.tables, turn)
         if fresh:
             origin, direction, cells = self._camera_sample(given.camera, given.tables, given.launch, sample)
             throughput = spectral([mi.Float(1) for _ in range(count)])
@@ -362,7 +370,7 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
                             mode=dr.ReduceMode.NoConflicts,
                         )
             bad += dr.select(good, 0, 1)
-            sample += 1
+            turn += 1
         fresh = finished
-        active &= sample < end
+        active &= turn < end
     return sums, bad, segments, clamped

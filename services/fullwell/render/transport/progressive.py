@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,12 +16,14 @@ from fullwell.core.errors import CancelledError, RenderError
 from fullwell.core.rng import seed32
 from fullwell.radiometry import Spectrum, WavelengthGrid
 from fullwell.render.rays import CameraRays
+from fullwell.render.transport.collect import collect_surfaces
 from fullwell.render.transport.fog import FogLayer
 from fullwell.render.transport.geometry import Geometry
 from fullwell.render.transport.lights import LightSet
 from fullwell.render.transport.loading import load_geometry
 from fullwell.render.transport.loop import SLOTS, Launch, PathLoop, PathSums
 from fullwell.render.transport.materials import MaterialTable
+from fullwell.render.transport.moments import Moments, Turns
 from fullwell.render.transport.replay import device_arrays, replayed
 from fullwell.render.transport.upload import upload
 from fullwell.render.transport.wavelengths import CELL_COUNT, CELL_NM, SpectraTable, cell_centres_nm, cell_means
@@ -37,6 +40,9 @@ _LANES = 1 << 20
 _FILM_FLOATS = 1 << 23
 _SAMPLES_PER_LAUNCH = 1 << 22
 """Bounds memory and the time between two looks at whether to go on. The result does not depend on either."""
+
+_PIXELS_AT_A_TIME = 1 << 16
+"""Of an image that moves: bounds the memory of the lists of what is to be traced when."""
 
 _UNIFORM_SHARE = 0.2
 """Share of the wavelengths that is spread evenly, so that no colour is left to a few samples of great weight."""
@@ -81,6 +87,8 @@ class Work:
         Number that a path carries.
     group_importance
         Factor by which the lamps of a group are sampled more often, by the group's name; 1 for those left out.
+    moments
+        What `scene` and `camera` are while the film is exposed, where they move; None: they stand still.
     """
 
     scene: SceneDescription
@@ -93,47 +101,117 @@ class Work:
     seed: int
     wavelengths: int = 8
     group_importance: tuple[tuple[str, float], ...] = ()
+    moments: Moments | None = None
 
 
-class ProgressiveImage:
-    """Sums of samples so far. `add` takes more of them, anywhere; everything else looks at what is there."""
+class _Tracer:
+    """One scene on the device: what the path loop needs of it."""
 
-    def __init__(self, mi: Any, work: Work) -> None:
-        self._mi, self._work = mi, work
-        self._geometry = load_geometry(mi, work.scene, work.camera.camera_to_world[:3, 3])
-        surfaces = self._geometry.surfaces
-        self.groups: tuple[str, ...] = surfaces.groups if work.keep_groups else ("all",)
+    def __init__(  # noqa: PLR0917 - made in one place
+        self, mi: Any, work: Work, scene: SceneDescription, geometry: Geometry, weights: NDArray[np.float64], number: int
+    ) -> None:
+        surfaces = geometry.surfaces
         spectra = SpectraTable()
-        self._weights = self._spectral_weights()
         importance = dict(work.group_importance)
+        centre_m = np.asarray(work.camera.camera_to_world[:3, 3])
+        self.geometry, self.number = geometry, number
         self._materials = MaterialTable(mi, spectra, surfaces.materials)
         of_materials = spectra.count
         self._lights = LightSet(
             mi,
             spectra,
             surfaces,
-            work.scene.lights,
-            centre_m=np.asarray(work.camera.camera_to_world[:3, 3]),
-            weights=self._weights,
+            scene.lights,
+            centre_m=centre_m,
+            weights=weights,
             group_weights=np.array([importance.get(name, 1.0) for name in surfaces.groups]),
-            scene_radius_m=_radius_m(self._geometry),
+            scene_radius_m=_radius_m(geometry),
         )
-        self._light_shape = _mean_shape(spectra, range(of_materials, spectra.count), self._weights)
-        height_m = float(work.camera.camera_to_world[2, 3])
-        fog = None if work.scene.fog is None else FogLayer(mi, work.scene.fog, height_m)
-        self._loop = PathLoop(
+        self.light_shape = _mean_shape(spectra, range(of_materials, spectra.count), weights)
+        self.loop = PathLoop(
             mi,
-            self._geometry,
+            geometry,
             self._materials,
             self._lights,
-            fog,
+            None if scene.fog is None else FogLayer(mi, scene.fog, float(centre_m[2])),
             wavelengths=work.wavelengths,
             channels=len(work.responses),
-            groups=len(self.groups),
+            groups=len(surfaces.groups) if work.keep_groups else 1,
             bands=work.keep_bands,
         )
-        self._camera = CameraRays(mi, work.camera)
-        self._tables = self._geometry.tables | self._device_tables(spectra)
+        self.tables = geometry.tables | {"spectra": spectra.finish(mi)}
+
+
+class _Moment:
+    """A scene as a camera sees it at one time."""
+
+    def __init__(self, tracer: _Tracer, camera: CameraRays, shared: dict[str, Any]) -> None:
+        self.loop, self.camera = tracer.loop, camera
+        self.number = tracer.number
+        self.scene = tracer.geometry.scene
+        self._tables_of_scene = tracer.tables
+        self.share(shared)
+
+    def share(self, shared: dict[str, Any]) -> None:
+        """Take over the tables that all moments have in common."""
+        self.tables = self._tables_of_scene | shared
+        self.inputs = device_arrays(self.loop, self.camera, self.tables)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Lanes:
+    """Lanes of work, (n,) each: a replica of a pixel, its turns [first, first + counts), and which samples these are."""
+
+    pixels: NDArray[np.int64]
+    replicas: NDArray[np.int64]
+    first: NDArray[np.int64]
+    counts: NDArray[np.int64]
+    residues: NDArray[np.int64]
+    whole: bool = False
+    """Whether all replicas of each pixel stand side by side, and each pixel once."""
+
+    def where(self, part: slice | NDArray[np.bool_]) -> _Lanes:
+        """Return some of the lanes; a slice of whole pixels stays whole."""
+        whole = self.whole and isinstance(part, slice)
+        return _Lanes(self.pixels[part], self.replicas[part], self.first[part], self.counts[part], self.residues[part], whole)
+
+
+def _still_lanes(pixels: NDArray[np.int64], first: NDArray[np.int64], counts: NDArray[np.int64]) -> _Lanes:
+    """Return the lanes that take samples [first, first + counts) of each pixel."""
+    replicas = np.tile(np.arange(REPLICAS), len(pixels))
+    pixels, first, counts = (np.repeat(values, REPLICAS) for values in (pixels, first, counts))
+    return _Lanes(pixels, replicas, first, counts, np.zeros(len(pixels), dtype=np.int64), whole=True)
+
+
+def _lanes_by_moment(
+    turns: Turns, count: int, pixels: NDArray[np.int64], first: NDArray[np.int64], counts: NDArray[np.int64]
+) -> list[_Lanes]:
+    """Return the lanes that take samples [first, first + counts) of each pixel in each of `count` moments."""
+    replicas = np.tile(np.arange(REPLICAS), len(pixels))
+    columns = []
+    for step in range(turns.steps):
+        begin, more = turns.span(first, counts, step)
+        moment = turns.moment(pixels, step)
+        by_lane = [np.repeat(values, REPLICAS) for values in (pixels, begin, more)]
+        table = np.stack([moment.ravel(), by_lane[0], replicas, by_lane[1], by_lane[2], np.full(len(replicas), step)])
+        columns.append(table[:, table[4] > 0])
+    table = np.concatenate(columns, axis=1)
+    # Equal counts side by side, as without motion.
+    table = table[:, np.lexsort((table[4], table[0]))]
+    ends = np.searchsorted(table[0], np.arange(count + 1))
+    return [_Lanes(*table[1:, begin:end]) for begin, end in itertools.pairwise(ends)]
+
+
+class ProgressiveImage:
+    """Sums of samples so far. `add` takes more of them, anywhere; everything else looks at what is there."""
+
+    def __init__(self, mi: Any, work: Work) -> None:
+        import drjit as dr  # noqa: PLC0415 - the renderer is loaded late
+
+        self._mi, self._work = mi, work
+        self._weights = self._spectral_weights()
+        self._moments = self._moments_of(mi)
+        self.groups: tuple[str, ...] = self._group_names if work.keep_groups else ("all",)
         self.rows, self.cols = work.camera.film.rows, work.camera.film.cols
         pixels, bands = self.rows * self.cols, work.grid.count
         self._seeds = _lane_seeds(work.seed, pixels)
@@ -146,7 +224,34 @@ class ProgressiveImage:
         self.segments = 0
         self.cpu_s = 0.0
         self._clamped = 0.0
-        self._inputs: list[Any] | None = None
+        self._turns: Turns | None = None
+        if work.moments is not None and work.moments.count > 1:
+            kept = bands if work.keep_bands else 1
+            self._turns = Turns(work.moments, cols=self.cols, replicas=REPLICAS, seed=work.seed, bands=kept)
+            self._shared["stride"] = dr.opaque(mi.UInt32, self._turns.steps)
+            self._share_tables()
+
+    def _moments_of(self, mi: Any) -> list[_Moment]:
+        """Load what the samples look at; a scene that several moments share is loaded once, all about the same point."""
+        work, centre_m = self._work, np.asarray(self._work.camera.camera_to_world[:3, 3])
+        scenes = (work.scene,) if work.moments is None else work.moments.scenes
+        cameras = (work.camera,) if work.moments is None else work.moments.cameras
+        tracers: dict[int, _Tracer] = {}
+        for scene in scenes:
+            if id(scene) not in tracers:
+                still = all(other is scene for other in scenes)
+                geometry = load_geometry(mi, scene, centre_m) if still else Geometry(mi, collect_surfaces(scene, centre_m))
+                tracers[id(scene)] = _Tracer(mi, work, scene, geometry, self._weights, len(tracers))
+        first = tracers[id(scenes[0])]
+        self._group_names = first.geometry.surfaces.groups
+        # The same for all moments, so that a sample has the same wavelengths in each.
+        self._shared = self._device_tables(first.light_shape)
+        pairs = zip(scenes, cameras, strict=True)
+        return [_Moment(tracers[id(scene)], CameraRays(mi, camera, centre_m), self._shared) for scene, camera in pairs]
+
+    def _share_tables(self) -> None:
+        for moment in self._moments:
+            moment.share(self._shared)
 
     # What is there ---------------------------------------------------------------------------------------------------
 
@@ -195,8 +300,8 @@ class ProgressiveImage:
         if self._band_sums is not None:
             self._band_sums[:] = 0.0
         self.bad_samples, self.segments, self._clamped = 0, 0, 0.0
-        self._tables["inverse_clamp"] = self._inverse_clamp(clamp)
-        self._inputs = None
+        self._shared["inverse_clamp"] = self._inverse_clamp(clamp)
+        self._share_tables()
 
     def _inverse_clamp(self, clamp: NDArray[np.float64]) -> list[Any]:
         import drjit as dr  # noqa: PLC0415
@@ -207,72 +312,103 @@ class ProgressiveImage:
 
     def add(self, pixels: NDArray[np.int64], counts: NDArray[np.int64], report: Callable[[float], None]) -> None:
         """Take `counts` more samples in each replica of each of the `pixels`; `report` gets the finished fraction."""
-        cpu_started = time.process_time()
         keep = counts > 0
         pixels, counts = pixels[keep], counts[keep]
         # Equal counts side by side: lanes of a vector that have nothing left to do wait for the others.
         order = np.argsort(counts, kind="stable")
         pixels, counts = pixels[order], counts[order]
-        total, done, first = int(counts.sum()), 0, 0
+        total, done = REPLICAS * int(counts.sum()), 0
+        some = len(pixels) if self._turns is None else _PIXELS_AT_A_TIME
+        for begin in range(0, len(pixels), max(1, some)):
+            part = slice(begin, begin + some)
+            for moment, lanes in self._work_of(pixels[part], counts[part]):
+                self._add_lanes(moment, lanes, lambda more, base=done: report((base + more) / total))  # type: ignore[misc]
+                done += int(lanes.counts.sum())
+        self.counts[pixels] += counts
+
+    def _work_of(self, pixels: NDArray[np.int64], counts: NDArray[np.int64]) -> list[tuple[_Moment, _Lanes]]:
+        """Return which lanes take the samples, and in which moment."""
+        if self._turns is None:
+            return [(self._moments[0], _still_lanes(pixels, self.counts[pixels], counts))]
+        by_moment = _lanes_by_moment(self._turns, len(self._moments), pixels, self.counts[pixels], counts)
+        return list(zip(self._moments, by_moment, strict=True))
+
+    def _add_lanes(self, moment: _Moment, lanes: _Lanes, report: Callable[[int], None]) -> None:
+        """Trace lanes of work, some at a time."""
+        cpu_started = time.process_time()
+        done, first = 0, 0
         floats = len(self.groups) * self._work.grid.count if self._work.keep_bands else 1
-        lanes = min(_LANES, _FILM_FLOATS // floats)
-        while first < len(pixels):
-            most = max(1, min(lanes // REPLICAS, _SAMPLES_PER_LAUNCH // (REPLICAS * int(counts[first]))))
-            part = slice(first, min(len(pixels), first + most))
-            self._launch(pixels[part], counts[part])
-            done += int(counts[part].sum())
+        room = min(_LANES, _FILM_FLOATS // floats)
+        while first < len(lanes.pixels):
+            count = int(lanes.counts[first])
+            most = max(1, min(room // REPLICAS, _SAMPLES_PER_LAUNCH // (REPLICAS * count)))
+            part = slice(first, min(len(lanes.pixels), first + most * REPLICAS))
+            self._launch(moment, lanes.where(part))
+            done += int(lanes.counts[part].sum())
             first = part.stop
             self.cpu_s += time.process_time() - cpu_started
             cpu_started = time.process_time()
-            report(done / total)
+            report(done)
 
-    def _launch(self, pixels: NDArray[np.int64], counts: NDArray[np.int64]) -> None:
-        import drjit as dr  # noqa: PLC0415
-
-        mi = self._mi
+    def _launch(self, moment: _Moment, lanes: _Lanes) -> None:
+        import drjit as dr  # noqa: PLC0415 - the renderer is loaded late
 
         # Numbers of lanes are rounded up to a power of two with lanes that have nothing to do: a recording fits one number.
-        idle = (1 << (len(pixels) - 1).bit_length()) - len(pixels) if len(pixels) > 1 else 0
-        padded = np.concatenate([pixels, np.zeros(idle, dtype=np.int64)])
+        # Over time to a power of four, since each moment has recordings of its own.
+        busy = len(lanes.pixels)
+        bits = (busy - 1).bit_length()
+        width = max(REPLICAS, 1 << (bits if lanes.whole else bits + bits % 2))
 
         def by_lane(values: NDArray[Any]) -> Any:
-            return upload(mi.UInt32, np.repeat(values, REPLICAS).astype(np.uint32))
+            padded = np.zeros(width, dtype=np.uint32)
+            padded[:busy] = values
+            return upload(self._mi.UInt32, padded)
 
         launch = Launch(
-            pixel=by_lane(padded),
-            seed=upload(mi.UInt32, self._seeds[padded]),
-            first=by_lane(self.counts[padded]),
-            count=by_lane(np.concatenate([counts, np.zeros(idle, dtype=np.int64)])),
-            offset=upload(mi.UInt32, self._offsets[padded]),
+            pixel=by_lane(lanes.pixels),
+            seed=by_lane(self._seeds[lanes.pixels, lanes.replicas]),
+            first=by_lane(lanes.first),
+            count=by_lane(lanes.counts),
+            offset=by_lane(self._offsets[lanes.pixels, lanes.replicas]),
+            residue=by_lane(lanes.residues),
         )
-        sums = self._traced(launch)
+        sums = self._traced(moment, launch)
         dr.eval(sums.channels, sums.bands, sums.bad, sums.segments, sums.clamped)
-        busy, shape = len(pixels), (len(padded), REPLICAS)
         for group, channels in enumerate(sums.channels):
             for channel, values in enumerate(channels):
-                found = np.asarray(values.numpy(), dtype=np.float64).reshape(shape)
-                self._sums[:, group, channel, pixels] += found[:busy].T
+                found = np.asarray(values.numpy(), dtype=np.float64)[:busy]
+                self._keep(found, group, channel, lanes)
         if self._band_sums is not None and sums.bands is not None:
-            by_band = np.asarray(sums.bands.numpy()).reshape(*shape, len(self.groups), -1)[:busy]
-            self._band_sums[pixels] += by_band.sum(axis=1, dtype=np.float64)
+            by_band = np.asarray(sums.bands.numpy()).reshape(width, len(self.groups), -1)[:busy]
+            order = np.argsort(lanes.pixels, kind="stable")
+            found_pixels, starts = np.unique(lanes.pixels[order], return_index=True)
+            self._band_sums[found_pixels] += np.add.reduceat(by_band[order], starts, axis=0, dtype=np.float64)
         self.bad_samples += int(np.sum(sums.bad.numpy()))
         self._clamped += float(np.sum(sums.clamped.numpy(), dtype=np.float64))
         self.segments += int(np.sum(sums.segments.numpy(), dtype=np.int64))
-        self.counts[pixels] += counts
 
-    def _traced(self, launch: Launch) -> PathSums:
+    def _keep(self, found: NDArray[np.float64], group: int, channel: int, lanes: _Lanes) -> None:
+        """Add what lanes found of a channel to the sums."""
+        if lanes.whole:
+            self._sums[:, group, channel, lanes.pixels[::REPLICAS]] += found.reshape(-1, REPLICAS).T
+            return
+        # One after the other: a replica of a pixel may be there more than once, with other turns.
+        place = (lanes.replicas * len(self.groups) + group) * self._sums.shape[2] + channel
+        np.add.at(self._sums.reshape(-1), place * self.pixels + lanes.pixels, found)
+
+    def _traced(self, moment: _Moment, launch: Launch) -> PathSums:
         """Return the sums of a launch, replayed where one of its kind was recorded before."""
-        if self._inputs is None:
-            self._inputs = device_arrays(self._loop, self._camera, self._tables)
 
         def function(scene: Any, *lanes: Any) -> Any:
-            sums = self._loop.trace(scene, self._camera, self._tables, Launch(*lanes))
+            sums = moment.loop.trace(scene, moment.camera, moment.tables, Launch(*lanes))
             return sums.channels, sums.bands, sums.bad, sums.segments, sums.clamped
 
         # The number of lanes is part of the kind: replayed with another one, the film of the bands would keep its old size.
-        kind = (self._loop.kind, self._camera.kind, self._work.grid.count, len(launch.pixel))
-        lanes = (launch.pixel, launch.seed, launch.first, launch.count, launch.offset)
-        return PathSums(*replayed(kind, function, self._geometry.scene, self._inputs, *lanes))
+        # So is that of the scene among those that are loaded together: its shapes' numbers are in the recording, though not in
+        # the compiled code.
+        kind = (moment.loop.kind, moment.camera.kind, self._work.grid.count, len(launch.pixel), moment.number)
+        lanes = (launch.pixel, launch.seed, launch.first, launch.count, launch.offset, launch.residue)
+        return PathSums(*replayed(kind, function, moment.scene, moment.inputs, *lanes))
 
     # Tables ----------------------------------------------------------------------------------------------------------
 
@@ -289,11 +425,11 @@ class ProgressiveImage:
         shares = np.divide(responses, peaks, out=np.zeros_like(responses), where=peaks > 0)
         return np.where(inside, shares.sum(axis=0) * centres, 0.0)
 
-    def _device_tables(self, spectra: SpectraTable) -> dict[str, Any]:
+    def _device_tables(self, light_shape: NDArray[np.float64]) -> dict[str, Any]:
         import drjit as dr  # noqa: PLC0415
 
         mi, work = self._mi, self._work
-        slots, density = self._slots()
+        slots, density = self._slots(light_shape)
         width_nm = work.grid.step_nm * work.grid.count
         centres = cell_centres_nm()
         edges = work.grid.edges_nm
@@ -306,10 +442,10 @@ class ProgressiveImage:
             per_energy = cell_means(response) * centres * _PHOTONS_PER_J_NM * inside
             responses[number] = per_energy * spread_nm / work.wavelengths
         return {
-            "spectra": spectra.finish(mi),
             "responses": upload(mi.Float, responses.astype(np.float32)),
             "slots": upload(mi.UInt32, slots),
             "columns": dr.opaque(mi.UInt32, work.camera.film.cols),
+            "stride": dr.opaque(mi.UInt32, 1),
             "max_depth": dr.opaque(mi.UInt32, work.max_depth),
             "band_count": dr.opaque(mi.UInt32, work.grid.count),
             "band_count_host": work.grid.count,
@@ -320,12 +456,12 @@ class ProgressiveImage:
             "photons_per_j_nm": dr.opaque(mi.Float, _PHOTONS_PER_J_NM),
         }
 
-    def _slots(self) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
+    def _slots(self, light_shape: NDArray[np.float64]) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
         """Return (SLOTS,) cells that equal shares of the wavelengths fall into, and (cells,) probabilities.
 
         Wavelengths are drawn where the lamps shine and the channels see, plus an even share over all that may count.
         """
-        wanted = self._weights * self._light_shape
+        wanted = self._weights * light_shape
         possible = self._weights > 0
         if not possible.any():
             possible = np.ones(CELL_COUNT, dtype=bool)

@@ -353,7 +353,9 @@ def _beams(document: TrafficDocument, item: PlacedAsset, asset: DrawnAsset, cont
             direction = beam_direction(to_world[:3, 0], to_world[:3, 2], beam.down_deg)
             # Luminous intensity is to radiant intensity what luminance is to radiance.
             intensity = scale_to_luminance(spd, beam.intensity_cd)
-            yield SpotLight(_three(place), _three(direction), intensity, beam.beam_deg, beam.cutoff_deg, "headlights")
+            yield SpotLight(
+                _three(place), _three(direction), intensity, beam.beam_deg, beam.cutoff_deg, "headlights", carrier=item.id
+            )
 
 
 _BEFORE_LENS_M: Final = 0.05
