@@ -40,13 +40,12 @@ def _carried(light: Light, transforms: Mapping[str, NDArray[np.float64]]) -> Lig
     matrix = transforms.get(getattr(light, "carrier", ""))
     if matrix is None:
         return light
-    changes: dict[str, Any] = {
-        name: tuple((matrix[:3, :3] @ np.asarray(getattr(light, name), dtype=np.float64)).tolist())
-        for name in _DIRECTIONS
-        if hasattr(light, name)
-    }
     place = matrix @ np.array([*getattr(light, "position_m"), 1.0])  # noqa: B009 - only lamps with a place have a carrier
-    return replace(light, **changes, **{"position_m": tuple(place[:3].tolist())})
+    changes: dict[str, Any] = {"position_m": tuple(place[:3].tolist())}
+    for name in _DIRECTIONS:
+        if hasattr(light, name):
+            changes[name] = tuple((matrix[:3, :3] @ np.asarray(getattr(light, name), dtype=np.float64)).tolist())
+    return replace(light, **changes)
 
 
 def camera_at(camera: Camera, motion: Motion, interval_s: float) -> Camera:
