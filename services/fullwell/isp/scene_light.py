@@ -26,6 +26,7 @@ from fullwell.scene import (
     DirectionalLight,
     Disk,
     Geometry,
+    GoniometricLight,
     ImageEnvironment,
     Light,
     Mesh,
@@ -112,6 +113,10 @@ def _irradiance(light: Light, point_m: NDArray[np.float64]) -> NDArray[np.float6
             return (
                 _band_values(light.intensity) * _spot_falloff(light, point_m) / _squared_distance_m2(light.position_m, point_m)
             )
+        case GoniometricLight():
+            return (
+                _band_values(light.intensity) * _pattern_share(light, point_m) / _squared_distance_m2(light.position_m, point_m)
+            )
         case DirectionalLight():
             return _band_values(light.irradiance)
         case ConstantEnvironment():
@@ -134,6 +139,12 @@ def _spot_falloff(light: SpotLight, point_m: NDArray[np.float64]) -> float:
     cosine = float(towards @ axis / max(float(np.linalg.norm(towards) * np.linalg.norm(axis)), np.finfo(float).tiny))
     angle_deg = math.degrees(math.acos(min(1.0, max(-1.0, cosine))))
     return min(1.0, max(0.0, (light.cutoff_deg - angle_deg) / (light.cutoff_deg - light.beam_deg)))
+
+
+def _pattern_share(light: GoniometricLight, point_m: NDArray[np.float64]) -> float:
+    x, y, z = ((point_m - np.array(light.position_m)) @ light.frame()).tolist()
+    azimuth, elevation = math.degrees(math.atan2(y, x)), math.degrees(math.atan2(z, math.hypot(x, y)))
+    return float(light.pattern.share(azimuth, elevation))
 
 
 def _picture_values(light: ImageEnvironment) -> NDArray[np.float64]:

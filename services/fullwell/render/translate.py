@@ -30,6 +30,7 @@ from fullwell.scene import (
     Diffuse,
     DirectionalLight,
     Disk,
+    GoniometricLight,
     ImageEnvironment,
     Light,
     Material,
@@ -428,6 +429,11 @@ def _emitter(mi: Any, light: Light, recentre: NDArray[np.float64]) -> dict[str, 
                 "cutoff_angle": float(light.cutoff_deg),
                 "beam_width": float(light.beam_deg),
             }
+        case GoniometricLight():
+            raise FieldError(
+                "lamps with a beam pattern, as headlamps are, need the compiled renderer; leave them out or install libLLVM.",
+                path="scene.lights",
+            )
         case DirectionalLight():
             return {
                 "type": "directional",

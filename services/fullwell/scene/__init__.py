@@ -2,6 +2,7 @@
 
 from fullwell.scene.camera import Camera, Film, Lens, look_at
 from fullwell.scene.description import (
+    BeamPattern,
     Conductor,
     ConstantEnvironment,
     Cube,
@@ -13,6 +14,7 @@ from fullwell.scene.description import (
     Emission,
     Fog,
     Geometry,
+    GoniometricLight,
     ImageEnvironment,
     Light,
     Material,
@@ -33,6 +35,7 @@ from fullwell.scene.description import (
 from fullwell.scene.hits import SurfaceHits
 
 __all__ = [
+    "BeamPattern",
     "Camera",
     "Conductor",
     "ConstantEnvironment",
@@ -46,6 +49,7 @@ __all__ = [
     "Film",
     "Fog",
     "Geometry",
+    "GoniometricLight",
     "ImageEnvironment",
     "Lens",
     "Light",

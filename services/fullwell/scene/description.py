@@ -6,11 +6,12 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fullwell.radiometry.spectrum import Spectrum
 
 __all__ = [
+    "BeamPattern",
     "Conductor",
     "ConstantEnvironment",
     "Cube",
@@ -22,6 +23,7 @@ __all__ = [
     "Emission",
     "Fog",
     "Geometry",
+    "GoniometricLight",
     "ImageEnvironment",
     "Light",
     "Material",
@@ -234,6 +236,95 @@ class SpotLight:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class BeamPattern:
+    """How a lamp spreads its light: shares of its intensity over directions, bilinear between even steps, 0 outside.
+
+    Attributes
+    ----------
+    shares
+        (rows, cols), >= 0 and at least 2 each; rows go up in elevation, columns in azimuth.
+    azimuth_deg
+        (first, last) column, about the lamp's up, 0 forward and positive to its left, within [-180, 180].
+    elevation_deg
+        (first, last) row, from the plane of forward and left towards up, within [-90, 90].
+    """
+
+    shares: NDArray[np.float32]
+    azimuth_deg: tuple[float, float]
+    elevation_deg: tuple[float, float]
+
+    def azimuths_rad(self) -> NDArray[np.float64]:
+        """Return (cols,) azimuths [rad]."""
+        return np.radians(np.linspace(*self.azimuth_deg, self.shares.shape[1]))
+
+    def elevations_rad(self) -> NDArray[np.float64]:
+        """Return (rows,) elevations [rad]."""
+        return np.radians(np.linspace(*self.elevation_deg, self.shares.shape[0]))
+
+    def steps_rad(self) -> tuple[float, float]:
+        """Return the steps of azimuth and elevation [rad]."""
+        rows, cols = self.shares.shape
+        (left, right), (low, high) = np.radians(self.azimuth_deg), np.radians(self.elevation_deg)
+        return float(right - left) / (cols - 1), float(high - low) / (rows - 1)
+
+    def directions(self) -> NDArray[np.float64]:
+        """Return (rows, cols, 3) unit vectors in (forward, left, up)."""
+        elevation, azimuth = np.meshgrid(self.elevations_rad(), self.azimuths_rad(), indexing="ij")
+        flat = np.cos(elevation)
+        return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)], axis=-1)
+
+    def share(self, azimuth_deg: ArrayLike, elevation_deg: ArrayLike) -> NDArray[np.float64]:
+        """Return the shares in directions, as the renderer mixes them."""
+        rows, cols = self.shares.shape
+        col, row = (
+            (np.asarray(angle, dtype=np.float64) - first) / (last - first) * (count - 1)
+            for angle, (first, last), count in (
+                (azimuth_deg, self.azimuth_deg, cols),
+                (elevation_deg, self.elevation_deg, rows),
+            )
+        )
+        inside = (col >= 0) & (col <= cols - 1) & (row >= 0) & (row <= rows - 1)
+        side = np.clip(np.floor(col), 0, cols - 2).astype(np.int64)
+        top = np.clip(np.floor(row), 0, rows - 2).astype(np.int64)
+        across, down = np.clip(col - side, 0, 1), np.clip(row - top, 0, 1)
+        table = np.asarray(self.shares, dtype=np.float64)
+        low = table[top, side] * (1 - across) + table[top, side + 1] * across
+        high = table[top + 1, side] * (1 - across) + table[top + 1, side + 1] * across
+        return np.where(inside, low * (1 - down) + high * down, 0.0)
+
+    def solid_angle_sr(self) -> float:
+        """Return flux over the intensity of a share of 1 [sr]: midpoints of the table's cells."""
+        table = np.asarray(self.shares, dtype=np.float64)
+        middle = (table[1:, 1:] + table[:-1, 1:] + table[1:, :-1] + table[:-1, :-1]) / 4
+        sine = np.sin(self.elevations_rad())
+        return float((middle * np.diff(sine)[:, None]).sum() * self.steps_rad()[0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GoniometricLight:
+    """A point that shines by a pattern: `intensity` [W sr^-1 nm^-1] where its share is 1.
+
+    `up` need not be at right angles to `forward`, but not along it. `carrier` is the id of the object, in the scene or left out
+    of it, that it moves with; "" stands still.
+    """
+
+    position_m: tuple[float, float, float]
+    forward: tuple[float, float, float]
+    up: tuple[float, float, float]
+    pattern: BeamPattern
+    intensity: Spectrum
+    group: str = "default"
+    carrier: str = ""
+
+    def frame(self) -> NDArray[np.float64]:
+        """Return (3, 3) unit columns forward, left and up in the world."""
+        forward = np.asarray(self.forward, dtype=np.float64) / np.linalg.norm(self.forward)
+        left = np.cross(np.asarray(self.up, dtype=np.float64), forward)
+        left /= np.linalg.norm(left)
+        return np.column_stack([forward, left, np.cross(forward, left)])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class DirectionalLight:
     """Irradiance [W m^-2 nm^-1] on a surface facing the light; `direction` is the way the light travels."""
 
@@ -304,7 +395,9 @@ class Fog:
     top_m: float = 100.0
 
 
-Light: TypeAlias = PointLight | SpotLight | DirectionalLight | ConstantEnvironment | ImageEnvironment | SunSky
+Light: TypeAlias = (
+    PointLight | SpotLight | GoniometricLight | DirectionalLight | ConstantEnvironment | ImageEnvironment | SunSky
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

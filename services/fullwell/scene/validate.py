@@ -26,6 +26,7 @@ from fullwell.scene.description import (
     Disk,
     Fog,
     Geometry,
+    GoniometricLight,
     ImageEnvironment,
     Light,
     Material,
@@ -377,6 +378,9 @@ def _light(light: Light, where: _Place) -> None:
                     f"is {light.cutoff_deg} and beam_deg {light.beam_deg}; must be 0 < beam_deg < cutoff_deg < 90 and "
                     f"cutoff_deg >= {_NARROWEST_CONE_DEG}. Use a directional light for narrower beams.",
                 )
+        case GoniometricLight():
+            _position(light.position_m, where)
+            _goniometric(light, where)
         case DirectionalLight():
             _direction(light.direction, where, "direction")
             _power(light.irradiance, where, "irradiance")
@@ -386,6 +390,29 @@ def _light(light: Light, where: _Place) -> None:
             _environment_image(light, where)
         case SunSky():
             _sun(light, where)
+
+
+def _goniometric(light: GoniometricLight, where: _Place) -> None:
+    forward = _direction(light.forward, where, "forward")
+    up = _direction(light.up, where, "up")
+    if np.linalg.norm(np.cross(up / np.linalg.norm(up), forward / np.linalg.norm(forward))) < _LEAST_SINE_OF_UP:
+        where.fail("up", f"is {up.tolist()}, along forward, {forward.tolist()}; must not be. Turn one of them.")
+    pattern = light.pattern
+    if pattern.shares.ndim != 2 or min(pattern.shares.shape) < 2:
+        where.fail("pattern", f"has shape {pattern.shares.shape}; must be (rows, cols), at least 2 each.")
+    if not np.all(np.isfinite(pattern.shares)) or pattern.shares.min() < 0 or not pattern.shares.max() > 0:
+        where.fail("pattern", "holds NaN, Inf or negative values, or only zeros; each must be >= 0 and finite, one > 0.")
+    for name, (first, last), limit in (
+        ("azimuth_deg", pattern.azimuth_deg, 180.0),
+        ("elevation_deg", pattern.elevation_deg, 90.0),
+    ):
+        if not -limit <= first < last <= limit:
+            where.fail(f"pattern.{name}", f"is {first:g} to {last:g}; must go up, within -{limit:g} to {limit:g}.")
+    _power(light.intensity.scaled(max(1.0, float(pattern.shares.max()))), where, "intensity (times the largest share)")
+
+
+_LEAST_SINE_OF_UP = 1e-3
+"""Between forward and up of a lamp with a pattern."""
 
 
 def _position(position_m: ArrayLike, where: _Place) -> None:

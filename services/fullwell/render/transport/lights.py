@@ -1,7 +1,8 @@
 """All lights of a scene: choosing one and a direction to it, and how likely that was. See docs/physics/lights.md.
 
 Leaves number what can be hit or stands somewhere: emissive triangle f is leaf f, emissive curved shape i is leaf
-``emissive_faces + i``, and point and spot lights follow in the order of the scene. Lamps shine on the side of their normal.
+``emissive_faces + i``, and point, spot and goniometric lights follow in the order of the scene. Lamps shine on the side of
+their normal.
 """
 
 from __future__ import annotations
@@ -23,12 +24,14 @@ from fullwell.render.transport.environment import (
 )
 from fullwell.render.transport.light_shapes import CYLINDER, DISK, LEAF_FLOATS, SPHERE, LeafTable
 from fullwell.render.transport.light_tree import LeafBounds, TreeWalk, build_light_tree
+from fullwell.render.transport.patterns import PatternTable, pattern_bounds
 from fullwell.render.transport.surfaces import CurvedShape, SceneSurfaces
 from fullwell.render.transport.upload import upload
 from fullwell.render.transport.wavelengths import SpectraTable, look_up
 from fullwell.scene import (
     ConstantEnvironment,
     DirectionalLight,
+    GoniometricLight,
     ImageEnvironment,
     Light,
     PointLight,
@@ -130,6 +133,8 @@ class LightSet:
         self._emission = upload(mi.UInt32, collected.records.view(np.uint32)[:, [3, 7]])
         if len(finite):
             features |= {"tree"} | collected.kinds(finite)
+            if "pattern" in features:
+                self._patterns = PatternTable(mi, collected.patterned)
             tree = build_light_tree(collected.bounds(finite), finite)
             self._walk = TreeWalk(mi, tree, finite, len(collected.records))
             irradiance["tree"] = _typical_irradiance(collected, finite, surfaces, scene_radius_m)
@@ -245,6 +250,12 @@ class LightSet:
             clearance = dr.select(is_curved, curved.clearance, clearance)
         if "point" in self.features:
             (single, falloff), delta = self._leaves.sample_point(record, point), self._leaves.is_point(leaf)
+            if "pattern" in self.features:
+                number, forward = self._leaves.pattern(record)
+                patterned = active & delta & (number > 0)
+                share = self._patterns.share(number - 1, forward, -single.direction, patterned)
+                falloff = dr.select(patterned, falloff * share, falloff)
+                single.pdf = dr.select(patterned & ~(share > 0), 0.0, single.pdf)
             direction = dr.select(delta, single.direction, direction)
             distance = dr.select(delta, single.distance, distance)
             pdf = dr.select(delta, single.pdf, pdf)
@@ -429,7 +440,8 @@ class _Collected:
         self._spectra = spectra
         self._groups = {name: number for number, name in enumerate(surfaces.groups)}
         self._powers: dict[int, float] = {}
-        placed = [light for light in lights if isinstance(light, PointLight | SpotLight)]
+        placed = [light for light in lights if isinstance(light, PointLight | SpotLight | GoniometricLight)]
+        self.patterned: list[GoniometricLight] = []
         self.triangles, self.curved = surfaces.emissive_faces, surfaces.emissive_curved
         total = self.triangles + self.curved + len(placed)
         self.records = np.zeros((max(1, total), LEAF_FLOATS), dtype=np.float32)
@@ -508,7 +520,7 @@ class _Collected:
             self.spread_rad[leaf] = np.pi
         self.intensity[leaf] = self.power(row) * area * self._group_weights[part.group]
 
-    def _add_placed(self, leaf: int, light: PointLight | SpotLight, centre_m: Array) -> None:
+    def _add_placed(self, leaf: int, light: PointLight | SpotLight | GoniometricLight, centre_m: Array) -> None:
         row, group = self._spectra.add(light.intensity), self._group(light.group)
         place = np.asarray(light.position_m, dtype=np.float64) - centre_m
         self.records[leaf, 0:3] = place
@@ -519,9 +531,17 @@ class _Collected:
             self.records[leaf, 4:7] = self.axis[leaf] = axis
             self.records[leaf, 8:10] = cutoff, 1.0 / (cutoff - beam)
             self.spread_rad[leaf], self.emission_rad[leaf] = beam, cutoff - beam
+        largest = 1.0
+        if isinstance(light, GoniometricLight):
+            frame, bounds = light.frame(), pattern_bounds(light.pattern)
+            self.patterned.append(light)
+            self.records[leaf, 4:7], self.axis[leaf] = frame[:, 0], frame @ bounds.axis
+            self._names[leaf, 11] = len(self.patterned)
+            self.spread_rad[leaf], self.emission_rad[leaf] = bounds.bright_rad, bounds.end_rad
+            largest = float(light.pattern.shares.max())
         self._names[leaf, 3], self._names[leaf, 7] = row, group
         self.low_m[leaf] = self.high_m[leaf] = place
-        self.intensity[leaf] = self.power(row) * self._group_weights[group]
+        self.intensity[leaf] = self.power(row) * self._group_weights[group] * largest
 
     def _add_far(self, light: Light) -> None:
         match light:
@@ -546,12 +566,14 @@ class _Collected:
         self.environment_weight = float(self._group_weights[self.environment_group])
 
     def kinds(self, leaves: NDArray[np.int64]) -> set[str]:
-        """Return which of "curved" and "point" there are among the leaves."""
+        """Return which of "curved", "point" and "pattern" there are among the leaves."""
         kinds = set()
         if np.any((leaves >= self.triangles) & (leaves < self.triangles + self.curved)):
             kinds.add("curved")
         if np.any(leaves >= self.triangles + self.curved):
             kinds.add("point")
+            if self.patterned:
+                kinds.add("pattern")
         return kinds
 
     def bounds(self, leaves: NDArray[np.int64]) -> LeafBounds:
