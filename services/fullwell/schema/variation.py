@@ -11,8 +11,9 @@ from fullwell.core.rng import stream
 from fullwell.schema.v1.recipe import RecipeDocument
 from fullwell.schema.v1.vary import Choice, Integer, LogUniform, Normal, Uniform, VaryDocument
 
-__all__ = ["extreme_values", "frame_values"]
+__all__ = ["TIME_PATH", "clip_times", "extreme_values", "frame_values"]
 
+TIME_PATH = "scene.traffic.time_s"
 _MAX_REDRAWS = 1000
 
 
@@ -25,13 +26,34 @@ def frame_values(document: RecipeDocument, index: int) -> dict[str, Any]:
     if vary is None:
         return {}
     draws = 1 if vary.random is None else vary.random.frames
-    rest = index // vary.repeat
+    rest, moment = divmod(index // vary.repeat, 1 if vary.clip is None else vary.clip.frames)
     draw, cell = rest % draws, rest // draws
     values = _grid_values(vary, cell)
     if vary.random is not None:
         for path, distribution in vary.random.values.items():
             values[path] = _draw(distribution, document.seed, draw, path)
+    if vary.clip is not None:
+        values |= _clip_values(document, values, moment)
     return values
+
+
+def clip_times(vary: VaryDocument, start_s: float) -> tuple[float, ...]:
+    """Return the moments [s] of a clip that begins at `start_s`; that moment alone where the recipe makes no clip."""
+    if vary.clip is None:
+        return (start_s,)
+    return tuple(round(start_s + number / vary.clip.frame_rate_hz, 6) for number in range(vary.clip.frames))
+
+
+def _clip_values(document: RecipeDocument, values: dict[str, Any], moment: int) -> dict[str, Any]:
+    """Return the time of a moment of the clip, and when its ego was chosen: at the first."""
+    traffic = document.scene.traffic
+    if traffic is None or document.vary is None:  # what a recipe refuses
+        return {}
+    start_s = float(values.get(TIME_PATH, traffic.time_s))
+    found: dict[str, Any] = {TIME_PATH: clip_times(document.vary, start_s)[moment]}
+    if traffic.ego is not None and traffic.ego.id is None and traffic.ego.chosen_at_s is None:
+        found["scene.traffic.ego.chosen_at_s"] = start_s
+    return found
 
 
 def _grid_values(vary: VaryDocument, cell: int) -> dict[str, Any]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gzip
 import re
 import shutil
 import tempfile
+import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, Literal
@@ -14,12 +16,14 @@ from fullwell.core.hashing import sha256_hex
 from fullwell.traffic.sumo import SumoLimits, TrafficError, run_sumo_program, sumo_home
 from fullwell.traffic.templates import TEMPLATE_NAMES, CrossSection, template
 
-__all__ = ["GENERATED_NAMES", "NetworkFile", "NetworkSpec", "make_network"]
+__all__ = ["GENERATED_NAMES", "NetworkFile", "NetworkSpec", "make_network", "read_road_file"]
 
 GENERATED_NAMES: Final = ("grid", "spider", "random")
 
 _MAX_FILE_BYTES: Final = 256 << 20
 _KINDS: Final = {".net.xml": "sumo", ".osm": "osm", ".osm.xml": "osm", ".xodr": "opendrive"}
+_PLAIN_VERSION: Final = 1.0
+"""Networks of this version of the format, and later ones, are taken as they are: building them again would move junctions."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +35,7 @@ class NetworkSpec:
     layout
         grid, spider, random (netgenerate) or a name of `TEMPLATE_NAMES`.
     file
-        .net.xml, .osm, .osm.xml or .xodr.
+        .net.xml, .osm, .osm.xml or .xodr, or one of these packed as .gz.
     section
         Each direction of the roads of a layout. Files bring their own; sidewalks are guessed where they have none.
     length_m
@@ -86,10 +90,16 @@ def make_network(spec: NetworkSpec, *, path: str = "scene.traffic.network", limi
             known = (*GENERATED_NAMES, *TEMPLATE_NAMES)
             where = f"{path}.layout"
             raise TrafficError(f"{where}: {unknown_name_message('road layout', spec.layout, known)}", where, spec.layout)
-        xml = re.sub(rb"<!--.*?-->\s*", b"", (folder / "out.net.xml").read_bytes(), flags=re.DOTALL)
+        xml = _cleaned((folder / "out.net.xml").read_bytes())
     if b"<edge " not in xml:
         raise TrafficError(f"{path} holds no roads. Choose a file or an area with streets.", path)
     return NetworkFile(xml, warnings)
+
+
+def _cleaned(xml: bytes) -> bytes:
+    """Return a network without comments, which hold dates, and without the files that its traffic lights would write."""
+    plain = re.sub(rb"<!--.*?-->\s*", b"", xml, flags=re.DOTALL)
+    return re.sub(rb"<param\s[^>]*\bkey=[\"'](?:[^\"']*\.)?(?:file|output)[\"'][^>]*/>", b"", plain)
 
 
 _COMMON: Final = ("--no-turnarounds.except-deadend", "true", "--junctions.corner-detail", "8", "--precision", "3")
@@ -149,20 +159,12 @@ def _from_file(file: Path, folder: Path, path: str, limits: SumoLimits | None) -
     kind = _kind_of(file, path)
     if not file.is_file():
         raise TrafficError(f"{path}.file is {file.name!r}, which does not exist.", f"{path}.file", file.name)
-    size = file.stat().st_size
-    if size > _MAX_FILE_BYTES:
-        raise TrafficError(
-            f"{path}.file is {size >> 20} MiB; at most {_MAX_FILE_BYTES >> 20}. Cut out a smaller area.",
-            f"{path}.file",
-            file.name,
-        )
     suffix = {"sumo": ".net.xml", "osm": ".osm.xml", "opendrive": ".xodr"}[kind]
     given = folder / f"in{suffix}"
-    shutil.copyfile(file, given)
-    _refuse_entities(given, path)
+    given.write_bytes(read_road_file(file, path=f"{path}.file"))
     read: list[str]
     if kind == "sumo":
-        # Through netconvert as well: it checks the file and brings older versions up to date. Nothing is guessed.
+        # Through netconvert as well: it checks the file, and brings old versions up to date. Nothing is guessed.
         read = ["--sumo-net-file", given.name, "--offset.disable-normalization", "true"]
     elif kind == "osm":
         read = ["--osm-files", given.name, "--geometry.remove", "true", "--roundabouts.guess", "true", "--ramps.guess", "true"]
@@ -195,24 +197,55 @@ def _from_file(file: Path, folder: Path, path: str, limits: SumoLimits | None) -
         read += ["--type-files", str(sumo_home() / "data" / "typemap" / "opendriveNetconvertPedestrians.typ.xml")]
     common = list(_COMMON) if kind != "sumo" else ["--precision", "3"]
     arguments = [*read, "--output-file", "out.net.xml", *common]
-    return run_sumo_program("netconvert", arguments, folder=folder, path=f"{path}.file", what=repr(file.name), limits=limits)
+    warnings = run_sumo_program(
+        "netconvert", arguments, folder=folder, path=f"{path}.file", what=repr(file.name), limits=limits
+    )
+    if kind == "sumo" and _version(given.read_bytes()) >= _PLAIN_VERSION:
+        shutil.copyfile(given, folder / "out.net.xml")
+        return ()
+    return warnings
+
+
+def _version(xml: bytes) -> float:
+    """Return the version of SUMO's format that a network says it has, 0 where it says none."""
+    found = re.search(rb"<net\s[^>]*\bversion=[\"'](\d+)\.(\d+)", xml)
+    return 0.0 if found is None else float(found[1]) + float(found[2]) / 1000
+
+
+def read_road_file(file: Path, *, path: str, most_bytes: int = _MAX_FILE_BYTES) -> bytes:
+    """Return the text of a file of SUMO's, unpacked where it is packed.
+
+    Raises
+    ------
+    TrafficError
+        It is too large, damaged, or defines XML entities: no such file needs them, and they are how small files become huge.
+    """
+    try:
+        with file.open("rb") as stream:
+            packed = stream.read(2) == b"\x1f\x8b"
+        with gzip.open(file) if packed else file.open("rb") as stream:
+            text = stream.read(most_bytes + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise TrafficError(f"{path} is {file.name!r}, which cannot be read: {error}.", path, file.name) from error
+    if len(text) > most_bytes:
+        raise TrafficError(
+            f"{path} is {file.name!r}, of more than {most_bytes >> 20} MiB. Cut out a smaller area, or a shorter time.",
+            path,
+            file.name,
+        )
+    if b"<!ENTITY" in text:
+        raise TrafficError(f"{path} is {file.name!r}, which defines XML entities; that is not allowed. Export it again.", path)
+    return text
 
 
 def _kind_of(file: Path, path: str) -> Literal["sumo", "osm", "opendrive"]:
-    name = file.name.lower()
+    name = file.name.lower().removesuffix(".gz")
     for suffix, kind in _KINDS.items():
         if name.endswith(suffix):
             return kind  # type: ignore[return-value]
     raise TrafficError(
-        f"{path}.file is {file.name!r}; must end in {', '.join(_KINDS)}. Convert it, or rename it if it is one of these.",
+        f"{path}.file is {file.name!r}; must end in {', '.join(_KINDS)} (and .gz). Convert it, or rename it "
+        "if it is one of these.",
         f"{path}.file",
         file.name,
     )
-
-
-def _refuse_entities(file: Path, path: str) -> None:
-    """Refuse documents that define entities: no road file needs them, and they are how small files become huge."""
-    with file.open("rb") as stream:
-        while piece := stream.read(1 << 20):
-            if b"<!ENTITY" in piece:
-                raise TrafficError(f"{path}.file defines XML entities, which is not allowed. Export it again.", f"{path}.file")

@@ -12,7 +12,7 @@ import shapely
 from numpy.typing import NDArray
 
 from fullwell.assets.records import AssetManifest
-from fullwell.traffic.simulation import Mover
+from fullwell.traffic.trajectories import Mover
 
 __all__ = ["AssetShelf", "Footprints", "PlacedAsset", "Role", "footprint"]
 

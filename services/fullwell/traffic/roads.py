@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -150,6 +151,12 @@ class RoadNetwork:
 
 def read_network(file: NetworkFile, *, path: str = "scene.traffic.network") -> RoadNetwork:
     """Return the geometry of a network. Raises TrafficError where it cannot be read or holds no lane for vehicles."""
+    if re.search(rb"<net\s[^>]*\blefthand=[\"'](?:true|1|yes|on|x)", file.xml):
+        raise TrafficError(
+            f"{path} drives on the left. Streets are dressed and marked for driving on the right only: choose another area, or "
+            "build it with netconvert --lefthand false.",
+            path,
+        )
     net = _sumo_net(file, path)
     lanes = list(_lanes(net))
     if not any(lane.kind in ("drive", "bus", "bike", "rail") for lane in lanes):

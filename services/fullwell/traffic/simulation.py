@@ -8,32 +8,30 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final, Literal
-from xml.etree.ElementTree import ParseError, iterparse
+from typing import Final
+from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fullwell.core.rng import stream
+from fullwell.traffic.own_runs import OwnRun
 from fullwell.traffic.roads import Lane, RoadNetwork
 from fullwell.traffic.sumo import SumoLimits, TrafficError, run_sumo_program
+from fullwell.traffic.trajectories import MoverType, TrafficFrame, TrafficKind, read_fcd, read_signal_states
 
 __all__ = [
     "TRAFFIC_KINDS",
-    "Mover",
-    "Signals",
     "TrafficDemand",
-    "TrafficFrame",
-    "TrafficKind",
     "TrafficRun",
     "VehicleModel",
-    "read_fcd",
+    "drive",
+    "idle_signals",
     "simulate",
 ]
 
 Array = NDArray[np.float64]
-TrafficKind = Literal["car", "van", "bus", "lorry", "motorcycle", "cyclist", "tram", "pedestrian"]
 
 _VCLASSES: Final[Mapping[TrafficKind, str]] = MappingProxyType(
     {
@@ -49,19 +47,11 @@ _VCLASSES: Final[Mapping[TrafficKind, str]] = MappingProxyType(
 )
 TRAFFIC_KINDS: Final[tuple[TrafficKind, ...]] = tuple(_VCLASSES)
 
-_KIND_OF_VCLASS: Final[Mapping[str, TrafficKind]] = MappingProxyType(
-    {
-        "passenger": "car", "private": "car", "taxi": "car", "evehicle": "car", "hov": "car", "emergency": "car",
-        "delivery": "van", "bus": "bus", "coach": "bus", "truck": "lorry", "trailer": "lorry",
-        "motorcycle": "motorcycle", "moped": "motorcycle", "scooter": "motorcycle", "bicycle": "cyclist",
-        "tram": "tram", "rail_urban": "tram", "pedestrian": "pedestrian", "wheelchair": "pedestrian",
-    }
-)  # fmt: skip
-
 _STEP_S: Final = 0.1
-"""SUMO's step where clips of high frame rates are wanted too; at 1 s lane changes and stops are jerky."""
+"""SUMO's step; at 1 s lane changes and stops are jerky."""
+_AROUND_S: Final = 1.1
+"""Steps this long before and after the wanted moments are written too: they tell how things turn and what lies between."""
 _MOST_TRIPS: Final = 20_000
-_SNAP_S: Final = 1e-6
 _BORDER_M: Final = 15.0
 """How near a road must end to a dead end to lead into or out of the network."""
 
@@ -85,75 +75,14 @@ class VehicleModel:
 class TrafficDemand:
     """How much of each kind: new ones per second in the whole network, or how many there are per kilometre of lane.
 
-    Both may be given; a kind in neither does not appear.
+    `entry_rates_per_s` are new ones per second at each way into the network, with as many there at the start as such a stream
+    has on its way; kinds that the network has no lane for, or that have no model, are left out of these. A network without an
+    end has a tenth of its edges as ways in. A kind that is in none of the three does not appear.
     """
 
     rates_per_s: Mapping[TrafficKind, float] = field(default_factory=dict)
     densities_per_km: Mapping[TrafficKind, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True)
-class Signals:
-    """Lamps of a vehicle that are on."""
-
-    brake: bool = False
-    left: bool = False
-    right: bool = False
-    reverse: bool = False
-
-    @classmethod
-    def from_bits(cls, bits: int) -> Signals:
-        """Return what SUMO's signal bits say (MSVehicle::Signalling): 0 right, 1 left, 2 both, 3 brake, 7 reverse."""
-        both = bool(bits & 4)
-        return cls(brake=bool(bits & 8), left=both or bool(bits & 2), right=both or bool(bits & 1), reverse=bool(bits & 128))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Mover:
-    """One vehicle or walker at one moment.
-
-    Attributes
-    ----------
-    id, model, kind
-        SUMO's id, stable over a run; the name of its `VehicleModel`.
-    front_m
-        (3,) [m] middle of the front bumper (of a walker: its front), on the road, in the world's coordinates.
-    yaw_rad
-        Of its forward axis, counter-clockwise from +x. SUMO's angle is clockwise from north.
-    slope_rad
-        Up is positive.
-    speed_m_s, acceleration_m_s2
-        Along its forward axis.
-    lane, position_m
-        Lane and place along it; empty for walkers off the lanes.
-    """
-
-    id: str
-    model: str
-    kind: TrafficKind
-    front_m: Array
-    yaw_rad: float
-    slope_rad: float
-    speed_m_s: float
-    acceleration_m_s2: float
-    lane: str
-    position_m: float
-    signals: Signals = Signals()
-
-    def centre_m(self, length_m: float) -> Array:
-        """Return the point (3,) on the road below its middle."""
-        level = math.cos(self.slope_rad)
-        forward = np.array([level * math.cos(self.yaw_rad), level * math.sin(self.yaw_rad), math.sin(self.slope_rad)])
-        return self.front_m - length_m / 2 * forward
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class TrafficFrame:
-    """All movers at a time [s], sorted by id, and the state text of each traffic light."""
-
-    time_s: float
-    movers: tuple[Mover, ...]
-    signals: Mapping[str, str]
+    entry_rates_per_s: Mapping[TrafficKind, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -199,30 +128,130 @@ def simulate(
             )
         types = "".join(_type_element(model) for model in models)
         (folder / "demand.rou.xml").write_text(f"<routes>{types}{''.join(text for *_, text in trips)}</routes>")
-        (folder / "signals.add.xml").write_text(_signal_outputs(network))
+        (folder / "signals.add.xml").write_text(_SIGNAL_OUTPUT)
         arguments = ["--net-file", "roads.net.xml", "--route-files", "demand.rou.xml", "--additional-files", "signals.add.xml"]
-        arguments += [*_RUN_OPTIONS, "--seed", f"{seed % 2**31}", "--end", f"{end_s:g}"]
-        arguments += ["--device.fcd.begin", f"{min(times_s):g}"]
+        arguments += _flat({**_DRIVING, **_OUTPUTS, **_QUIET})
+        arguments += ["--seed", f"{seed % 2**31}", "--end", f"{end_s:g}"]
+        arguments += ["--device.fcd.begin", f"{max(0.0, min(times_s) - 2 * _STEP_S):g}"]
         warnings = run_sumo_program("sumo", arguments, folder=folder, path=path, what="the traffic", limits=limits)
-        kinds = {model.name: model.kind for model in models}
-        frames = read_fcd(folder / "fcd.xml", network, times_s=times_s, kinds=kinds, path=path)
-        states = _signal_states(folder / "signals.xml", times_s)
-    placed = tuple(TrafficFrame(frame.time_s, frame.movers, states.get(frame.time_s, {})) for frame in frames)
+        known = {model.name: MoverType(model.kind, model.length_m) for model in models}
+        return _run_of(folder, network, known, times_s=times_s, path=path, warnings=warnings)
+
+
+def _run_of(
+    folder: Path,
+    network: RoadNetwork,
+    types: Mapping[str, MoverType],
+    *,
+    times_s: Sequence[float],
+    path: str,
+    warnings: Sequence[str],
+) -> TrafficRun:
+    """Return what SUMO wrote into its folder."""
+    frames = read_fcd(folder / "fcd.xml", network, times_s=times_s, types=types, path=path)
+    states = read_signal_states(folder / "signals.xml", times_s, path=path)
+    placed = tuple(TrafficFrame(frame.time_s, frame.movers, states[frame.time_s]) for frame in frames)
     return TrafficRun(placed, tuple(dict.fromkeys(warnings)))
 
 
-_RUN_OPTIONS: Final = (
-    *("--step-length", f"{_STEP_S:g}", "--fcd-output", "fcd.xml", "--fcd-output.signals", "true"),
-    *("--fcd-output.acceleration", "true", "--precision", "4", "--no-step-log", "true"),
-    *("--ignore-route-errors", "true", "--collision.action", "warn", "--collision.check-junctions", "true"),
-    *("--time-to-teleport", "-1", "--pedestrian.model", "striping", "--lateral-resolution", "0.8", "--default.speeddev", "0.1"),
-    *("--random-depart-offset", "0", "--xml-validation", "never", "--duration-log.disable", "true"),
+def drive(
+    network: RoadNetwork,
+    own: OwnRun,
+    *,
+    times_s: Sequence[float],
+    path: str = "scene.traffic.run",
+    limits: SumoLimits | None = None,
+) -> TrafficRun:
+    """Return the traffic of the user's own SUMO configuration at `times_s` [s], times as its own clock shows them.
+
+    It runs in a folder of its own, with its own options and step, and is cut off after the last moment.
+
+    Raises
+    ------
+    TrafficError
+        SUMO cannot run it, it takes too long, or it begins later than a moment.
+    """
+    begin_s = _seconds(own.options.get("begin", "0"), path)
+    if min(times_s) < begin_s:
+        where = f"{path}: the run begins at {begin_s:g} s, after time_s = {min(times_s):g}. Choose a later time_s."
+        raise TrafficError(where, path, min(times_s))
+    with tempfile.TemporaryDirectory(prefix="fullwell-traffic-") as name:
+        folder = Path(name)
+        (folder / "roads.net.xml").write_bytes(network.file.xml)
+        (folder / "signals.add.xml").write_text(_SIGNAL_OUTPUT)
+        for text_name, text in own.files.items():
+            (folder / text_name).write_bytes(text)
+        additional = ",".join(filter(None, (own.options.get("additional-files"), "signals.add.xml")))
+        options = {**own.options, "net-file": "roads.net.xml", "additional-files": additional, **_OUTPUTS, **_QUIET}
+        options |= {"end": f"{max(times_s) + 2 * _AROUND_S:g}", "device.fcd.begin": f"{max(0, min(times_s) - _AROUND_S):g}"}
+        (folder / "run.sumocfg").write_bytes(_configuration(options))
+        arguments = ["--configuration-file", "run.sumocfg"]
+        warnings = run_sumo_program("sumo", arguments, folder=folder, path=path, what="the run", limits=limits or _OWN_LIMITS)
+        return _run_of(folder, network, own.types, times_s=times_s, path=path, warnings=warnings)
+
+
+def idle_signals(
+    network: RoadNetwork, times_s: Sequence[float], *, path: str = "scene.traffic.network"
+) -> dict[float, dict[str, str]]:
+    """Return {time: {traffic light: state}} by the network's own programs, as they run where nobody drives."""
+    if not network.signals:
+        return {time: {} for time in times_s}
+    with tempfile.TemporaryDirectory(prefix="fullwell-signals-") as name:
+        folder = Path(name)
+        (folder / "roads.net.xml").write_bytes(network.file.xml)
+        (folder / "signals.add.xml").write_text(_SIGNAL_OUTPUT)
+        arguments = ["--net-file", "roads.net.xml", "--additional-files", "signals.add.xml", "--end", f"{max(times_s) + 1:g}"]
+        arguments += _flat(_QUIET)
+        run_sumo_program("sumo", arguments, folder=folder, path=path, what="its traffic lights")
+        return read_signal_states(folder / "signals.xml", times_s, path=path)
+
+
+_OWN_LIMITS: Final = SumoLimits(time_s=300.0)
+_SIGNAL_OUTPUT: Final = '<additional><timedEvent type="SaveTLSSwitchStates" dest="signals.xml"/></additional>'
+_OUTPUTS: Final[Mapping[str, str]] = MappingProxyType(
+    {"fcd-output": "fcd.xml", "fcd-output.signals": "true", "fcd-output.acceleration": "true", "precision": "4"}
+)
+_QUIET: Final[Mapping[str, str]] = MappingProxyType(
+    {"no-step-log": "true", "xml-validation": "never", "xml-validation.net": "never", "duration-log.disable": "true"}
+)
+_DRIVING: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "step-length": f"{_STEP_S:g}",
+        "ignore-route-errors": "true",
+        "collision.action": "warn",
+        "collision.check-junctions": "true",
+        "time-to-teleport": "-1",
+        "pedestrian.model": "striping",
+        "lateral-resolution": "0.8",
+        "default.speeddev": "0.1",
+        "random-depart-offset": "0",
+    }
 )
 
 
+def _flat(options: Mapping[str, str]) -> list[str]:
+    return [word for name, value in options.items() for word in (f"--{name}", value)]
+
+
+def _configuration(options: Mapping[str, str]) -> bytes:
+    root = ElementTree.Element("configuration")
+    for name, value in options.items():
+        ElementTree.SubElement(root, name, value=value)
+    return ElementTree.tostring(root)
+
+
+def _seconds(text: str, path: str) -> float:
+    """Return a time of SUMO's [s]: seconds, or [days:]hours:minutes:seconds."""
+    try:
+        return sum(float(part) * unit for part, unit in zip(reversed(text.split(":")), (1, 60, 3600, 86_400), strict=False))
+    except ValueError:
+        raise TrafficError(
+            f"{path} begins at {text!r}, which is no time. Give seconds or hours:minutes:seconds.", path
+        ) from None
+
+
 def _check_demand(demand: TrafficDemand, models: Sequence[VehicleModel], path: str) -> None:
-    wanted = {**demand.rates_per_s, **demand.densities_per_km}
-    for kind, amount in wanted.items():
+    for kind, amount in (*demand.rates_per_s.items(), *demand.densities_per_km.items()):
         if not (amount >= 0 and math.isfinite(amount)):
             raise TrafficError(f"{path}.demand.{kind} is {amount:g}; must be >= 0.", f"{path}.demand.{kind}", amount)
         if amount > 0 and not any(model.kind == kind and model.weight > 0 for model in models):
@@ -234,7 +263,7 @@ def _check_demand(demand: TrafficDemand, models: Sequence[VehicleModel], path: s
 def _checked_times(times_s: Sequence[float], path: str) -> float:
     if not times_s or min(times_s) < 0 or not all(math.isfinite(time) for time in times_s):
         raise TrafficError(f"{path}: the moments to take must be at least one time >= 0 s.", path)
-    return max(times_s) + _STEP_S
+    return max(times_s) + 2 * _STEP_S
 
 
 def _type_element(model: VehicleModel) -> str:
@@ -243,12 +272,6 @@ def _type_element(model: VehicleModel) -> str:
     gap = ' minGap="0.25"' if model.kind == "pedestrian" else ' minGap="2.0"'
     beside = ' latAlignment="right"' if model.kind == "cyclist" else ""
     return f'<vType id={quoteattr(model.name)} vClass="{vclass}" {size}{gap}{beside}/>'
-
-
-def _signal_outputs(network: RoadNetwork) -> str:
-    names = sorted({link.signal for link in network.signals})
-    events = "".join(f'<timedEvent type="SaveTLSStates" source={quoteattr(name)} dest="signals.xml"/>' for name in names)
-    return f"<additional>{events}</additional>"
 
 
 # Demand --------------------------------------------------------------------------------------------------------------
@@ -260,9 +283,13 @@ def _trips(
     """Yield (departure [s], id, element); a stream of its own for each kind, so that one kind's demand moves no other."""
     for kind in TRAFFIC_KINDS:
         rate, density = demand.rates_per_s.get(kind, 0.0), demand.densities_per_km.get(kind, 0.0)
-        if rate <= 0 and density <= 0:
+        entry_rate = demand.entry_rates_per_s.get(kind, 0.0)
+        if rate <= 0 and density <= 0 and entry_rate <= 0:
             continue
         edges = _usable_edges(network, kind)
+        has_model = any(model.kind == kind and model.weight > 0 for model in models)
+        if rate <= 0 and density <= 0 and not (edges and has_model):
+            continue
         if not edges:
             raise TrafficError(
                 f"{path}.demand.{kind}: the network has no lane for a {kind}. Leave it out.", f"{path}.demand.{kind}"
@@ -271,6 +298,8 @@ def _trips(
         weights = np.array([model.weight for model in chosen]) / sum(model.weight for model in chosen)
         choice = _EndChoice(network, edges, walks=kind == "pedestrian")
         lanes_km = sum(lane.length_m for lane in edges.values()) / 1000.0
+        rate += entry_rate * choice.ways_in
+        density += 1000.0 * entry_rate / _usual_speed_m_s(kind, list(edges.values()))
         there = int(stream(seed, "traffic", kind, "there").poisson(density * lanes_km)) if density > 0 else 0
         arrivals = _arrivals(stream(seed, "traffic", kind, "arrivals"), rate, end_s)
         departures = [(f"{kind}{number}", 0.0, True) for number in range(there)]
@@ -280,6 +309,16 @@ def _trips(
             rng = stream(seed, "trip", name)
             model = chosen[int(rng.choice(len(chosen), p=weights))]
             yield depart_s, name, _trip(rng, name, model, choice, depart_s=depart_s, spread=spread)
+
+
+def _usual_speed_m_s(kind: TrafficKind, lanes: Sequence[Lane]) -> float:
+    """Return how fast a kind goes: the lanes' limit, or what legs can do."""
+    limits = np.array([lane.speed_m_s for lane in lanes])
+    lengths = np.array([lane.length_m for lane in lanes])
+    return min(float(limits @ lengths / lengths.sum()), _BY_LEG_M_S.get(kind, math.inf))
+
+
+_BY_LEG_M_S: Final[Mapping[TrafficKind, float]] = MappingProxyType({"pedestrian": 1.3, "cyclist": 4.5})
 
 
 def _arrivals(rng: np.random.Generator, rate_per_s: float, end_s: float) -> list[float]:
@@ -320,7 +359,9 @@ class _EndChoice:
         def near(point: Array) -> bool:
             return len(places) > 0 and bool(np.linalg.norm(places - point[:2], axis=1).min() < _BORDER_M)
 
-        self._starts = [name for name, lane in edges.items() if near(lane.centre_m[0])] or self._names
+        border_starts = [name for name, lane in edges.items() if near(lane.centre_m[0])]
+        self._starts = border_starts or self._names
+        self.ways_in = len(border_starts) or -(-len(self._names) // 10)
         self._ends = frozenset(name for name, lane in edges.items() if near(lane.centre_m[-1]))
         self._goals: dict[str, list[str]] = {}
 
@@ -348,95 +389,3 @@ def _trip(
     place = "random_free" if spread else "base"
     how = f'departPos="{place}" departSpeed="{"0" if spread else "max"}" departLane="best"'
     return f'<trip id={quoted} type={kind} depart="{depart_s:.2f}" from={quoteattr(start)} to={quoteattr(goal)} {how}/>'
-
-
-# Reading -------------------------------------------------------------------------------------------------------------
-
-
-def read_fcd(
-    file: Path,
-    network: RoadNetwork,
-    *,
-    times_s: Sequence[float],
-    kinds: Mapping[str, TrafficKind],
-    path: str = "scene.traffic.run",
-) -> tuple[TrafficFrame, ...]:
-    """Return the movers of an fcd-output file at `times_s`, in their order, without signals.
-
-    `kinds` maps types to kinds; a type that is not in it is judged by the words in its name, and is a car if none fits.
-
-    Raises
-    ------
-    TrafficError
-        The file is damaged, or holds none of a wanted time; the message tells which times it holds.
-    """
-    wanted = {round(time / _SNAP_S): time for time in times_s}
-    found: dict[float, tuple[Mover, ...]] = {}
-    first, last = math.inf, -math.inf
-    try:
-        for _, element in iterparse(file, events=("end",)):
-            if element.tag != "timestep":
-                continue
-            time = float(element.get("time", "nan"))
-            first, last = min(first, time), max(last, time)
-            place = round(time / _SNAP_S)
-            if place in wanted:
-                movers = [_mover(item, network, kinds) for item in element if item.tag in ("vehicle", "person")]
-                found[wanted[place]] = tuple(sorted(movers, key=lambda mover: mover.id))
-            element.clear()
-    except (ParseError, ValueError, OSError) as error:
-        raise TrafficError(f"{path} is no readable fcd-output of SUMO: {error}.", path) from error
-    missing = [time for time in times_s if time not in found]
-    if missing:
-        span = f"it holds {first:g} to {last:g} s" if last >= first else "it holds no time step"
-        raise TrafficError(f"{path} holds no step at {missing[0]:g} s; {span}. Choose another time.", path, missing[0])
-    return tuple(TrafficFrame(time, found[time], {}) for time in times_s)
-
-
-def _mover(item: Any, network: RoadNetwork, kinds: Mapping[str, TrafficKind]) -> Mover:
-    model = item.get("type", "")
-    kind = kinds.get(model) or ("pedestrian" if item.tag == "person" else _kind_by_name(model))
-    place = np.array([float(item.get("x")), float(item.get("y")), float(item.get("z", "0"))]) - network.origin_m
-    return Mover(
-        id=item.get("id"),
-        model=model,
-        kind=kind,
-        front_m=place,
-        yaw_rad=math.radians(90.0 - float(item.get("angle", "0"))),
-        slope_rad=math.radians(float(item.get("slope", "0"))),
-        speed_m_s=float(item.get("speed", "0")),
-        acceleration_m_s2=float(item.get("acceleration", "0")),
-        lane=item.get("lane") or item.get("edge") or "",
-        position_m=float(item.get("pos", "0")),
-        signals=Signals.from_bits(int(item.get("signals", "0"))),
-    )
-
-
-_NAME_WORDS: Final[tuple[tuple[str, TrafficKind], ...]] = (
-    ("truck", "lorry"), ("lorry", "lorry"), ("trailer", "lorry"), ("bus", "bus"), ("coach", "bus"), ("motor", "motorcycle"),
-    ("moped", "motorcycle"), ("bike", "cyclist"), ("bicycle", "cyclist"), ("cycl", "cyclist"), ("tram", "tram"),
-    ("rail", "tram"), ("ped", "pedestrian"), ("person", "pedestrian"), ("van", "van"), ("delivery", "van"),
-)  # fmt: skip
-
-
-def _kind_by_name(model: str) -> TrafficKind:
-    name = model.casefold()
-    exact = _KIND_OF_VCLASS.get(name.removeprefix("default_").removesuffix("type"))
-    if exact is not None:
-        return exact
-    return next((kind for word, kind in _NAME_WORDS if word in name), "car")
-
-
-def _signal_states(file: Path, times_s: Sequence[float]) -> dict[float, dict[str, str]]:
-    """Return {time: {signal: state}}: the last state at or before each time."""
-    states: dict[float, dict[str, str]] = {time: {} for time in times_s}
-    if not file.is_file():
-        return states
-    for _, element in iterparse(file, events=("end",)):
-        if element.tag == "tlsState":
-            at = float(element.get("time", "0"))
-            for time, known in states.items():
-                if at <= time + _SNAP_S:
-                    known[element.get("id", "")] = element.get("state", "")
-            element.clear()
-    return states

@@ -19,24 +19,18 @@ from fullwell.assets.records import AssetManifest
 from fullwell.core.rng import stream
 from fullwell.traffic.dressing import draw_paint, dress, pivot_of_pole, street_style
 from fullwell.traffic.networks import NetworkSpec, make_network
+from fullwell.traffic.own_runs import OwnRun
 from fullwell.traffic.placement import AssetShelf, Footprints, PlacedAsset, footprint
+from fullwell.traffic.ribbons import cut
 from fullwell.traffic.roads import Lane, RoadNetwork, read_network
-from fullwell.traffic.simulation import (
-    Mover,
-    TrafficDemand,
-    TrafficFrame,
-    TrafficKind,
-    TrafficRun,
-    VehicleModel,
-    read_fcd,
-    simulate,
-)
+from fullwell.traffic.simulation import TrafficDemand, TrafficRun, VehicleModel, drive, idle_signals, simulate
 from fullwell.traffic.sumo import TrafficError
 from fullwell.traffic.surfaces import KERB_HEIGHT_M, GroundPlan, RoadSurface, ground_plan, road_surfaces
+from fullwell.traffic.trajectories import Mover, TrafficFrame, TrafficKind, read_fcd, read_signal_states
 
 Array = NDArray[np.float64]
 
-__all__ = ["TRAFFIC_CLASSES", "Street", "StreetMoment", "StreetSpec"]
+__all__ = ["TRAFFIC_CLASSES", "RecordedRun", "Street", "StreetMoment", "StreetSpec"]
 
 TRAFFIC_CLASSES: Final[Mapping[TrafficKind, tuple[str, ...]]] = MappingProxyType(
     {
@@ -55,6 +49,22 @@ TRAFFIC_CLASSES: Final[Mapping[TrafficKind, tuple[str, ...]]] = MappingProxyType
 _PAINTED: Final = frozenset({"car", "van"})
 
 
+_EMERGENCY_WORDS: Final = ("emergency", "ambulance", "police", "fire", "rescue")
+_NAMED: Final = 5
+_SAME_LANE_M: Final = 1.5
+_SAME_WAY_COSINE: Final = 0.7
+_LONGER_M: Final = 1.0
+"""An asset may be this much longer than SUMO's vehicle: half of the gap that it keeps."""
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedRun:
+    """What a run of SUMO wrote: its fcd-output, and the states of its traffic lights (by SaveTLSStates) where it has them."""
+
+    fcd: Path
+    signals: Path | None = None
+
+
 @dataclass(frozen=True, slots=True)
 class StreetSpec:
     """What street is wanted.
@@ -63,8 +73,8 @@ class StreetSpec:
     ----------
     network, demand, style
         Roads, traffic, and the name of a dressing.
-    run_file
-        An fcd-output file of the user's own SUMO run on the network, instead of a demand.
+    run
+        The user's own traffic on the network instead of a demand: what his run of SUMO wrote, or a configuration to run.
     times_s
         The moments of a clip, or one.
     dressed, wet
@@ -76,7 +86,7 @@ class StreetSpec:
     network: NetworkSpec
     demand: TrafficDemand = field(default_factory=TrafficDemand)
     style: str = "city"
-    run_file: Path | None = None
+    run: RecordedRun | OwnRun | None = None
     times_s: tuple[float, ...] = (60.0,)
     lamps: str = "day"
     dressed: bool = True
@@ -86,12 +96,16 @@ class StreetSpec:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StreetMoment:
-    """A street at one time: all assets, movers first; the state of each signal; what was left out, and why."""
+    """A street at one time: all assets, movers first; the state of each signal; what was left out, and why.
+
+    `overlapping` are ids of movers that are left out because they stand in others.
+    """
 
     time_s: float
     assets: tuple[PlacedAsset, ...]
     signals: Mapping[str, str]
     notes: tuple[str, ...]
+    overlapping: tuple[str, ...] = ()
 
 
 class Street:
@@ -120,10 +134,16 @@ class Street:
     @cached_property
     def run(self) -> TrafficRun:
         """The traffic at all moments."""
-        spec = self.spec
-        if spec.run_file is not None:
-            frames = read_fcd(spec.run_file, self.network, times_s=spec.times_s, kinds={}, path=f"{self._path}.run")
-            return TrafficRun(frames, ())
+        spec, path = self.spec, f"{self._path}.run"
+        if isinstance(spec.run, OwnRun):
+            return drive(self.network, spec.run, times_s=spec.times_s, path=path)
+        if spec.run is not None:
+            frames = read_fcd(spec.run.fcd, self.network, times_s=spec.times_s, types={}, path=path)
+            if spec.run.signals is not None:
+                states = read_signal_states(spec.run.signals, spec.times_s, path=f"{path}.signals")
+            else:
+                states = idle_signals(self.network, spec.times_s)
+            return TrafficRun(tuple(replace(frame, signals=states[frame.time_s]) for frame in frames), ())
         return simulate(self.network, spec.demand, self._models(), seed=spec.seed, times_s=spec.times_s, path=self._path)
 
     def _models(self) -> list[VehicleModel]:
@@ -174,6 +194,46 @@ class Street:
         share = (place_m + left_m) / here.length_m
         return beside.at(share * beside.length_m)
 
+    def ids_seen(self, *, before_s: float) -> frozenset[str]:
+        """Return the ids of all who were in the network at earlier moments of the spec."""
+        return frozenset(mover.id for frame in self.run.frames if frame.time_s < before_s for mover in frame.movers)
+
+    def gap_ahead_m(self, item: PlacedAsset, movers: Sequence[PlacedAsset], within_m: float) -> float | None:
+        """Return the distance from a mover's front bumper to the tail of the next vehicle on its way, straight on.
+
+        None where none is within `within_m` [m]; walkers are no vehicles.
+        """
+        way = self._way_ahead(item, within_m)
+        if way is None:
+            return None
+        gaps = []
+        for other in movers:
+            if other.mover is None or other.mover.kind == "pedestrian" or other.id == item.id:
+                continue
+            tail = shapely.Point((other.position_m - other.asset.size_m[0] / 2 * other.mover.forward())[:2])
+            along_m = float(way.project(tail))
+            if not 0 < along_m <= within_m or way.distance(tail) > _SAME_LANE_M:
+                continue
+            ahead = np.subtract(*(way.interpolate(place).coords[0] for place in (along_m + 0.5, along_m - 0.5)))
+            if float(ahead @ other.mover.forward()[:2]) > _SAME_WAY_COSINE * float(np.linalg.norm(ahead)):
+                gaps.append(along_m)
+        return min(gaps, default=None)
+
+    def _way_ahead(self, item: PlacedAsset, length_m: float) -> Any | None:
+        """Return the line (shapely) of a mover's lane before its front bumper, straight on through junctions."""
+        mover = item.mover
+        lane = None if mover is None else self.lane(mover.lane)
+        if mover is None or lane is None:
+            return None
+        points = [mover.front_m[None, :2], cut(lane.centre_m, min(mover.position_m, lane.length_m), lane.length_m)[1:, :2]]
+        way_m, visited = lane.length_m - mover.position_m, {lane.id}
+        while way_m < length_m and (following := self._straight_on(lane, visited)) is not None:
+            points.append(following.centre_m[:, :2])
+            visited.add(following.id)
+            way_m, lane = way_m + following.length_m, following
+        line = np.concatenate(points)
+        return shapely.LineString(line) if len(line) > 1 else None
+
     def _straight_on(self, lane: Lane, visited: set[str]) -> Lane | None:
         edges = self.network.successors.get(lane.edge_id, ())
         _, ahead = lane.at(lane.length_m)
@@ -190,15 +250,17 @@ class Street:
     def moment(self, number: int) -> StreetMoment:
         """Return the street at the time of that number in the spec."""
         frame = self.run.frames[number]
-        movers, notes = self._movers(frame)
+        movers, notes, overlapping = self._movers(frame)
         standing = [self._signalled(item, frame.signals) for item in self.standing]
         kept, hidden = _without_overlaps(movers, standing)
         if hidden:
             notes.append(f"{hidden} standing objects were left out where traffic passes through their place.")
-        return StreetMoment(frame.time_s, (*movers, *kept), frame.signals, tuple(notes) + self.run.warnings[:8])
+        told = tuple(notes) + self.run.warnings[:8]
+        return StreetMoment(frame.time_s, (*movers, *kept), frame.signals, told, overlapping)
 
-    def _movers(self, frame: TrafficFrame) -> tuple[list[PlacedAsset], list[str]]:
-        taken, placed, dropped, swinging = Footprints(), [], 0, 0
+    def _movers(self, frame: TrafficFrame) -> tuple[list[PlacedAsset], list[str], tuple[str, ...]]:
+        taken, placed, swinging = Footprints(), [], 0
+        dropped: list[str] = []
         for mover in frame.movers:
             asset = self._asset_of(mover)
             if asset is None:
@@ -212,11 +274,14 @@ class Street:
             if taken.claim(footprint(item.position_m, item.yaw_rad, _body(asset))):
                 placed.append(item)
             else:
-                dropped += 1
-        notes = [f"{dropped} movers overlapped others in SUMO's own positions and were left out."] if dropped else []
+                dropped.append(mover.id)
+        notes = []
+        if dropped:
+            named = ", ".join(dropped[:_NAMED]) + (", ..." if len(dropped) > _NAMED else "")
+            notes.append(f"{len(dropped)} movers overlapped others in SUMO's own positions and were left out: {named}.")
         if swinging:
             notes.append(f"{swinging} long vehicles would have swung into buildings and were left out.")
-        return placed, notes
+        return placed, notes, tuple(dropped)
 
     @cached_property
     def _houses(self) -> Footprints:
@@ -231,15 +296,17 @@ class Street:
         named = next((asset for asset in choices if asset.id == mover.model), None)
         if named is not None or not choices:
             return named
-        # A type of the user's own: the same mover has the same asset at all moments.
-        return choices[int(stream(self.spec.seed, "asset of", mover.id).integers(len(choices)))]
+        # A type of the user's own: the same mover has the same asset at all moments, one that fits into its gap.
+        if not any(word in mover.model.casefold() for word in _EMERGENCY_WORDS):
+            choices = [asset for asset in choices if asset.asset_class != "emergency_vehicle"] or choices
+        fitting = [asset for asset in choices if asset.size_m[0] <= mover.length_m + _LONGER_M]
+        fitting = fitting or [min(choices, key=lambda asset: asset.size_m[0])]
+        return fitting[int(stream(self.spec.seed, "asset of", mover.id).integers(len(fitting)))]
 
     def _placed(self, mover: Mover, asset: AssetManifest) -> PlacedAsset:
         position = mover.centre_m(asset.size_m[0])
         if mover.kind == "pedestrian" and self._is_on_pavement(position):
             position[2] += KERB_HEIGHT_M
-        level = math.cos(mover.slope_rad)
-        forward = np.array([level * math.cos(mover.yaw_rad), level * math.sin(mover.yaw_rad), math.sin(mover.slope_rad)])
         paint = draw_paint(stream(self.spec.seed, "paint", mover.id)) if asset.asset_class in _PAINTED else ""
         return PlacedAsset(
             id=mover.id,
@@ -250,7 +317,7 @@ class Street:
             slope_rad=mover.slope_rad,
             lit=self._lit(mover, asset),
             paint=paint,
-            velocity_m_s=mover.speed_m_s * forward,
+            velocity_m_s=mover.speed_m_s * mover.forward(),
             mover=mover,
         )
 
@@ -273,7 +340,7 @@ class Street:
         lanes = {lane.id for lane in self.network.lanes if lane.edge_id == edge}
         links = [link for link in self.network.signals if link.from_lane in lanes and not link.crossing]
         shown = {states.get(link.signal, "")[link.index : link.index + 1] for link in links}
-        lit = _present(_ASPECTS[next((letter for letter in "GgyurR" if letter in shown), "r")], item.asset)
+        lit = _present(_ASPECTS[next((letter for letter in _ASPECTS if letter in shown), "r")], item.asset)
         return PlacedAsset(item.id, item.asset, item.role, item.position_m, item.yaw_rad, lit=lit)
 
 
@@ -285,8 +352,12 @@ _ASPECTS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
         "u": ("light_red*", "light_amber*"),
         "r": ("light_red*",),
         "R": ("light_red*",),
+        "s": ("light_red*",),
+        "o": ("light_amber*",),
+        "O": (),
     }
 )
+"""What is lit in each of SUMO's states, the freest first; "o" blinks, and is drawn lit."""
 
 
 def _present(patterns: Sequence[str], asset: AssetManifest) -> tuple[str, ...]:

@@ -19,7 +19,10 @@ PARKING: Final = "custom1"
 
 @dataclass(frozen=True, slots=True)
 class CrossSection:
-    """One direction of a road, widths [m]; 0 leaves a lane out. From the right: sidewalk, parking, bicycles, buses, others."""
+    """One direction of a road, widths [m]; 0 leaves a lane out.
+
+    From the right: sidewalk, parking, bicycles, buses, others, trams.
+    """
 
     lanes: int = 1
     lane_width_m: float = 3.2
@@ -27,6 +30,7 @@ class CrossSection:
     parking_width_m: float = 0.0
     bike_lane_width_m: float = 0.0
     bus_lane_width_m: float = 0.0
+    tram_lane_width_m: float = 0.0
     speed_m_s: float = 13.9
 
     def lane_elements(self) -> str:
@@ -39,11 +43,15 @@ class CrossSection:
         barred += ["pedestrian"] if self.sidewalk_width_m > 0 else []
         barred += ["bicycle"] if self.bike_lane_width_m > 0 else []
         given += [f'disallow="{" ".join(barred)}" width="{self.lane_width_m:g}"'] * self.lanes
+        given += [f'allow="tram" width="{self.tram_lane_width_m:g}"'] if self.tram_lane_width_m > 0 else []
         return "".join(f'<lane index="{index}" {attributes}/>' for index, attributes in enumerate(given))
 
     @property
     def _side_widths_m(self) -> tuple[float, ...]:
-        return self.sidewalk_width_m, self.parking_width_m, self.bike_lane_width_m, self.bus_lane_width_m
+        return (
+            *(self.sidewalk_width_m, self.parking_width_m, self.bike_lane_width_m, self.bus_lane_width_m),
+            self.tram_lane_width_m,
+        )
 
     @property
     def lane_count(self) -> int:

@@ -18,10 +18,11 @@ from fullwell.schema.conversion.driving import driving_facts
 from fullwell.schema.conversion.traffic import StreetView
 from fullwell.traffic.networks import NetworkSpec
 from fullwell.traffic.placement import PlacedAsset
-from fullwell.traffic.simulation import Signals, TrafficDemand
+from fullwell.traffic.simulation import TrafficDemand
 from fullwell.traffic.street import Street, StreetSpec
 from fullwell.traffic.surfaces import KERB_HEIGHT_M
 from fullwell.traffic.templates import CrossSection
+from fullwell.traffic.trajectories import Signals
 from street_assets import make_shelf
 
 SECTION = CrossSection(lanes=1, parking_width_m=2.2, sidewalk_width_m=3.0)
@@ -95,11 +96,6 @@ def test_yaw_rates_come_from_the_moment_that_follows(view: StreetView, facts: Dr
         assert user.yaw_rate_rad_s is not None
         turned = user.yaw_rad + user.yaw_rate_rad_s * STEP_S
         assert math.remainder(turned - later[user.object_id].yaw_rad, math.tau) == pytest.approx(0, abs=1e-9)
-
-
-def test_yaw_rates_are_unknown_where_the_run_has_no_later_moment(view: StreetView) -> None:
-    last = replace(view, moment=view.street.moment(1))
-    assert all(user.yaw_rate_rad_s is None for user in facts_of(last).users if user.role == "mover")
 
 
 def test_lane_borders_are_half_a_width_beside_the_centre_and_sidewalks_lie_on_the_kerb(facts: DrivingFacts) -> None:

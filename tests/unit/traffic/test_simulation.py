@@ -10,8 +10,9 @@ import pytest
 
 from fullwell.traffic.networks import NetworkSpec, make_network
 from fullwell.traffic.roads import RoadNetwork, read_network
-from fullwell.traffic.simulation import Mover, Signals, TrafficDemand, VehicleModel, read_fcd, simulate
+from fullwell.traffic.simulation import TrafficDemand, VehicleModel, simulate
 from fullwell.traffic.sumo import TrafficError
+from fullwell.traffic.trajectories import Mover, Signals, read_fcd
 
 MODELS = [
     VehicleModel("sedan", "car", 4.76, 1.9),
@@ -99,7 +100,7 @@ signals="8" acceleration="-1"/>
 
 def test_a_users_run_is_read_with_headings_slopes_and_signals(network: RoadNetwork, tmp_path: Path) -> None:
     (tmp_path / "fcd.xml").write_text(FCD)
-    (frame,) = read_fcd(tmp_path / "fcd.xml", network, times_s=[1.0], kinds={})
+    (frame,) = read_fcd(tmp_path / "fcd.xml", network, times_s=[1.0], types={})
     first, truck, walker = frame.movers
     assert [first.kind, truck.kind, walker.kind] == ["car", "lorry", "pedestrian"]
     assert (truck.yaw_rad, first.yaw_rad, walker.yaw_rad) == pytest.approx((math.pi / 2, 0.0, -math.pi / 2))
@@ -115,7 +116,7 @@ def test_a_damaged_run_or_a_time_that_it_lacks_is_refused(
 ) -> None:
     (tmp_path / "fcd.xml").write_text(content)
     with pytest.raises(TrafficError, match=says):
-        read_fcd(tmp_path / "fcd.xml", network, times_s=[9.0], kinds={})
+        read_fcd(tmp_path / "fcd.xml", network, times_s=[9.0], types={})
 
 
 @pytest.mark.parametrize(

@@ -161,7 +161,8 @@ class RecipeFiles:
 class Context:
     """State of the conversion of one frame.
 
-    `document` and `seed` are what assets are drawn by; `drawn_assets` notes {path of a geometry: pin}.
+    `document` and `seed` are what assets are drawn by; `drawn_assets` notes {path of a geometry: pin}. `moments_s` are
+    times [s] at which other frames of the recipe look at its street.
     """
 
     grid: WavelengthGrid
@@ -171,6 +172,7 @@ class Context:
     seed: int = 0
     drawn_assets: dict[str, str] = field(default_factory=dict)
     street: StreetView | None = None
+    moments_s: tuple[float, ...] = ()
     warnings: list[str] = field(default_factory=list)
     used_files: dict[str, str] = field(default_factory=dict)
     materials: dict[str, tuple[Material, Emission | None]] = field(default_factory=dict)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -23,18 +22,16 @@ if TYPE_CHECKING:
     from fullwell.schema.conversion.traffic import StreetView
     from fullwell.traffic.placement import PlacedAsset
     from fullwell.traffic.roads import Lane
-    from fullwell.traffic.street import Street, StreetMoment
+    from fullwell.traffic.street import Street
 
 __all__ = ["driving_facts"]
 
 Array = NDArray[np.float64]
 
-_SOON_S: Final = 0.5
-"""Within this time the turn of a vehicle between two moments is its yaw rate; after more it may have turned back."""
 _FINE_M: Final = 4.0
 """Outlines are cut to this length where the network has slopes, as the surfaces are."""
 _SMALLEST_M2: Final = 0.02
-_LETTERS: Final = "GgyurR"
+_LETTERS: Final = "GgyurRsoO"
 """In the order in which a light that controls several movements shows them."""
 _LIGHTS: Final = ("red", "amber", "green")
 
@@ -45,12 +42,11 @@ def driving_facts(view: StreetView, *, places_m: Sequence[Any], range_m: float, 
     `mounted` names the cameras that the ego carries.
     """
     moment, street = view.moment, view.street
-    rates = _yaw_rates(street, moment)
     parked = [item for item in moment.assets if item.role == "parked"]
-    users = [_user(item, rates) for item in moment.assets if item.mover is not None]
-    users += [_user(item, rates) for item in (*view.targets, *parked)]
+    users = [_user(item) for item in moment.assets if item.mover is not None]
+    users += [_user(item) for item in (*view.targets, *parked)]
     origins = np.array([np.asarray(place, dtype=np.float64)[:2] for place in places_m]).reshape(-1, 2)
-    ego = None if view.ego is None else EgoFacts(_user(view.ego, rates), tuple(mounted))
+    ego = None if view.ego is None else EgoFacts(_user(view.ego), tuple(mounted))
     return DrivingFacts(
         time_s=moment.time_s,
         users=tuple(users),
@@ -62,7 +58,7 @@ def driving_facts(view: StreetView, *, places_m: Sequence[Any], range_m: float, 
     )
 
 
-def _user(item: PlacedAsset, rates: Mapping[str, float]) -> RoadUser:
+def _user(item: PlacedAsset) -> RoadUser:
     mover, size = item.mover, item.asset.size_m
     length, width, height = float(size[0]), float(size[1]), float(size[2])
     common: dict[str, Any] = {
@@ -83,28 +79,13 @@ def _user(item: PlacedAsset, rates: Mapping[str, float]) -> RoadUser:
         lane=mover.lane,
         speed_m_s=mover.speed_m_s,
         acceleration_m_s2=mover.acceleration_m_s2,
-        yaw_rate_rad_s=rates.get(mover.id),
+        yaw_rate_rad_s=mover.yaw_rate_rad_s,
         brake=signals.brake,
         left=signals.left,
         right=signals.right,
         reverse=signals.reverse,
         **common,
     )
-
-
-def _yaw_rates(street: Street, moment: StreetMoment) -> dict[str, float]:
-    """Return {mover: yaw rate [rad/s]} where the run has a moment soon after this one."""
-    frames = {frame.time_s: frame for frame in street.run.frames}
-    later = sorted(time for time in frames if moment.time_s < time <= moment.time_s + _SOON_S)
-    if not later:
-        return {}
-    before = {item.mover.id: item.mover.yaw_rad for item in moment.assets if item.mover is not None}
-    rates = {}
-    for mover in frames[later[0]].movers:
-        if mover.id in before:
-            turn = math.remainder(mover.yaw_rad - before[mover.id], math.tau)
-            rates[mover.id] = turn / (later[0] - moment.time_s)
-    return rates
 
 
 # Roads ---------------------------------------------------------------------------------------------------------------

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import posixpath
 from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -20,11 +22,13 @@ from fullwell.schema.assets import candidates_of, traffic_queries
 from fullwell.schema.conversion.assets import DrawnAsset, asset_part_material, catalogue_material, lamp_of
 from fullwell.schema.conversion.context import Context, fail, located
 from fullwell.schema.v1.cameras import MountDocument
-from fullwell.schema.v1.traffic import EgoDocument, TargetDocument, TrafficDocument
+from fullwell.schema.v1.traffic import DemandDocument, EgoDocument, RoadNetworkDocument, TargetDocument, TrafficDocument
 
 if TYPE_CHECKING:
+    from fullwell.traffic.networks import NetworkSpec
+    from fullwell.traffic.own_runs import OwnRun
     from fullwell.traffic.placement import AssetShelf, PlacedAsset
-    from fullwell.traffic.street import Street, StreetMoment, StreetSpec
+    from fullwell.traffic.street import RecordedRun, Street, StreetMoment, StreetSpec
 
 __all__ = ["STREET_GROUPS", "StreetView", "Viewpoint", "mount_pose", "street_objects", "street_view"]
 
@@ -34,7 +38,6 @@ STREET_GROUPS: Final = ("headlights", "other", "streetlights")
 """Light groups of a street's own lamps: a recipe may weight them whether or not one is lit at its moment."""
 
 _KEPT_STREETS: Final = 4
-_LOOK_AHEAD_S: Final = 0.1
 _STANDARD_EYE: Final = (0.05, 0.2, 0.82)
 """Driver's eyes as shares of length, width and height, where an asset does not say."""
 _LEVEL_ERROR_PX: Final = 0.7
@@ -83,8 +86,8 @@ def street_view(document: TrafficDocument, context: Context) -> StreetView:
             _streets[key] = Street(spec, shelf, path=path)
         _streets.move_to_end(key)
         street = _streets[key]
-        moment = street.moment(0)
-        ego = None if document.ego is None else _ego(document.ego, moment, street)
+        moment = street.moment(spec.times_s.index(document.time_s))
+        ego = None if document.ego is None else _ego(document, moment, street)
         wanted = enumerate(document.targets)
         targets = tuple(_target(target, f"{path}.targets[{number}]", ego, street, shelf) for number, target in wanted)
     moment, notes = _without(moment, targets)
@@ -109,47 +112,30 @@ def _shelf(document: TrafficDocument, context: Context) -> tuple[AssetShelf, lis
 
 
 def _spec(document: TrafficDocument, context: Context) -> StreetSpec:
+    from fullwell.traffic.demand import preset  # noqa: PLC0415
     from fullwell.traffic.networks import NetworkSpec  # noqa: PLC0415
     from fullwell.traffic.simulation import TrafficDemand  # noqa: PLC0415
     from fullwell.traffic.street import StreetSpec  # noqa: PLC0415
-    from fullwell.traffic.templates import CrossSection  # noqa: PLC0415
 
-    roads, path = document.network, "scene.traffic"
-    files: dict[str, Path | None] = {}
-    for name, reference in (("network", roads.file), ("run", document.run.file if document.run else None)):
-        files[name] = None
-        if reference is not None:
-            file, context.used_files[reference] = context.files.find(reference, f"{path}.{name}.file")
-            files[name] = file
-    section = CrossSection(
-        lanes=roads.lanes,
-        lane_width_m=roads.lane_width_m,
-        sidewalk_width_m=roads.sidewalk_width_m,
-        parking_width_m=roads.parking_width_m,
-        bike_lane_width_m=roads.bike_lane_width_m,
-        bus_lane_width_m=roads.bus_lane_width_m,
-        speed_m_s=roads.speed_limit_m_s,
-    )
-    network = NetworkSpec(
-        layout=roads.layout or "",
-        file=files["network"],
-        section=section,
-        length_m=roads.length_m,
-        size=roads.size,
-        signals=roads.signals,
-        seed=roads.seed,
-    )
-    demand = TrafficDemand(
-        {kind: entry.rate_per_s for kind, entry in sorted(document.demand.items()) if entry.rate_per_s > 0},
-        {kind: entry.density_per_km for kind, entry in sorted(document.demand.items()) if entry.density_per_km > 0},
-    )
+    run, own_network = _run(document, context)
+    network = NetworkSpec(file=own_network)
+    if document.network is not None:
+        network = _network(document.network, context)
+    demand = document.demand or DemandDocument()
+    kinds = sorted(demand.by_kind().items())
+    times = set(context.moments_s) if document.time_s in context.moments_s else {document.time_s}
+    if document.ego is not None and document.ego.id is None and document.ego.chosen_at_s is not None:
+        times.add(document.ego.chosen_at_s)
     return StreetSpec(
         network=network,
-        demand=demand,
+        demand=TrafficDemand(
+            {kind: entry.rate_per_s for kind, entry in kinds if entry.rate_per_s > 0},
+            {kind: entry.density_per_km for kind, entry in kinds if entry.density_per_km > 0},
+            preset(demand.preset, demand.level, without=[kind for kind, _ in kinds]) if demand.preset else {},
+        ),
         style=document.style,
-        run_file=files["run"],
-        # A moment later tells how things turn; a user's run may not have one.
-        times_s=(document.time_s,) if document.run else (document.time_s, document.time_s + _LOOK_AHEAD_S),
+        run=run,
+        times_s=tuple(sorted(times)),
         lamps=document.lamps,
         dressed=document.dressed,
         wet=document.wet,
@@ -157,52 +143,122 @@ def _spec(document: TrafficDocument, context: Context) -> StreetSpec:
     )
 
 
+def _network(roads: RoadNetworkDocument, context: Context) -> NetworkSpec:
+    from fullwell.traffic.networks import NetworkSpec  # noqa: PLC0415
+    from fullwell.traffic.templates import CrossSection  # noqa: PLC0415
+
+    section = CrossSection(
+        lanes=roads.lanes,
+        lane_width_m=roads.lane_width_m,
+        sidewalk_width_m=roads.sidewalk_width_m,
+        parking_width_m=roads.parking_width_m,
+        bike_lane_width_m=roads.bike_lane_width_m,
+        bus_lane_width_m=roads.bus_lane_width_m,
+        tram_lane_width_m=roads.tram_lane_width_m,
+        speed_m_s=roads.speed_limit_m_s,
+    )
+    return NetworkSpec(
+        layout=roads.layout or "",
+        file=None if roads.file is None else _file(roads.file, "scene.traffic.network.file", context),
+        section=section,
+        length_m=roads.length_m,
+        size=roads.size,
+        signals=roads.signals,
+        seed=roads.seed,
+    )
+
+
+def _run(document: TrafficDocument, context: Context) -> tuple[RecordedRun | OwnRun | None, Path | None]:
+    """Return the user's own run, and its network where it brings one."""
+    from fullwell.traffic.own_runs import read_configuration  # noqa: PLC0415
+    from fullwell.traffic.street import RecordedRun  # noqa: PLC0415
+
+    if document.run is None:
+        return None, None
+    path, reference = "scene.traffic.run.file", document.run.file
+    file = _file(reference, path, context)
+    if not document.run.is_configuration:
+        signals = document.run.signals
+        states = None if signals is None else _file(signals.file, "scene.traffic.run.signals.file", context)
+        return RecordedRun(file, states), None
+
+    def find(named: str) -> Path:
+        """Return a file that the configuration names: relative to its folder, within the recipe's as all files are."""
+        where = posixpath.normpath(posixpath.join(posixpath.dirname(reference), named))
+        return _file(where, f"{path} names a file that", context)
+
+    with located(path):
+        own = read_configuration(file, find, path=path)
+    if own.left_out:
+        context.warn(f"{path}: options of the configuration that were not taken over: {', '.join(own.left_out)}.")
+    return own, own.network
+
+
+def _file(reference: str, path: str, context: Context) -> Path:
+    file, context.used_files[reference] = context.files.find(reference, path)
+    return file
+
+
 def _spec_key(spec: StreetSpec, context: Context) -> list[Any]:
     """Return what decides a street: files by their content."""
-    used = sorted(context.used_files.items()) if spec.network.file is not None or spec.run_file is not None else []
-    plain = replace(spec, network=replace(spec.network, file=None), run_file=None)
-    return [repr(plain), [digest for _, digest in used], spec.network.file is not None, spec.run_file is not None]
+    named = spec.network.file is not None or spec.run is not None
+    used = sorted(context.used_files.items()) if named else []
+    plain = replace(spec, network=replace(spec.network, file=None), run=None)
+    return [repr(plain), [list(entry) for entry in used], spec.network.file is not None, type(spec.run).__name__]
 
 
 # Ego, mounts, targets ------------------------------------------------------------------------------------------------
 
 
-def _ego(document: EgoDocument, moment: StreetMoment, street: Street) -> PlacedAsset:
-    path = "scene.traffic.ego"
+def _ego(document: TrafficDocument, moment: StreetMoment, street: Street) -> PlacedAsset:
+    """Return the vehicle that carries the cameras, where it is at the moment. Raises RecipeError where there is none."""
+    path, wanted = "scene.traffic.ego", document.ego
+    assert wanted is not None
+    if wanted.id is not None:
+        return _mover(wanted.id, f"{path}.id", moment, street)
+    if wanted.chosen_at_s is None or wanted.chosen_at_s == moment.time_s:
+        return _chosen(wanted, moment, street)
+    start = street.moment(street.spec.times_s.index(wanted.chosen_at_s))
+    return _mover(_chosen(wanted, start, street).id, path, moment, street)
+
+
+def _mover(name: str, path: str, moment: StreetMoment, street: Street) -> PlacedAsset:
     movers = [item for item in moment.assets if item.mover is not None]
-    if document.id is not None:
-        found = next((item for item in movers if item.id == document.id), None)
-        if found is None:
-            known = unknown_name_message("vehicle", document.id, [item.id for item in movers])
-            fail(f"{path}.id", f"is not in the network at {moment.time_s:g} s: {known}", document.id)
+    found = next((item for item in movers if item.id == name), None)
+    if found is not None:
         return found
-    kinds = [item for item in movers if item.mover is not None and item.mover.kind == document.kind]
-    fitting = [item for item in kinds if _fits(item, document, movers, street)]
+    if name in moment.overlapping:
+        fail(path, f"is {name!r}, which overlaps another at {moment.time_s:g} s and was left out. Choose another.", name)
+    if name in street.ids_seen(before_s=moment.time_s):
+        fail(path, f"is {name!r}, which has left the network at {moment.time_s:g} s. Choose an earlier time, or another.", name)
+    known = unknown_name_message("vehicle", name, [item.id for item in movers])
+    return fail(path, f"is not in the network at {moment.time_s:g} s: {known}", name)
+
+
+def _chosen(wanted: EgoDocument, moment: StreetMoment, street: Street) -> PlacedAsset:
+    movers = [item for item in moment.assets if item.mover is not None]
+    kinds = [item for item in movers if item.mover is not None and item.mover.kind == wanted.kind]
+    fitting = [item for item in kinds if _fits(item, wanted, movers, street)]
     if not fitting:
         fail(
-            path,
-            f"fits none of the {len(kinds)} vehicles of kind {document.kind!r} in the network at {moment.time_s:g} s. Relax "
+            "scene.traffic.ego",
+            f"fits none of the {len(kinds)} vehicles of kind {wanted.kind!r} in the network at {moment.time_s:g} s. Relax "
             "its conditions, raise the demand, or choose another time.",
         )
     return min(fitting, key=lambda item: item.id)
 
 
-def _fits(item: PlacedAsset, document: EgoDocument, movers: Sequence[PlacedAsset], street: Street) -> bool:
+def _fits(item: PlacedAsset, wanted: EgoDocument, movers: Sequence[PlacedAsset], street: Street) -> bool:
     assert item.mover is not None
     speed = item.mover.speed_m_s
-    if speed < document.min_speed_m_s or (document.max_speed_m_s is not None and speed > document.max_speed_m_s):
+    if speed < wanted.min_speed_m_s or (wanted.max_speed_m_s is not None and speed > wanted.max_speed_m_s):
+        return False
+    if wanted.lane is not None and not fnmatchcase(item.mover.lane, wanted.lane):
         return False
     lane = street.lane(item.mover.lane)
-    if lane is None or lane.length_m - item.mover.position_m < document.min_road_ahead_m:
-        return document.min_road_ahead_m <= 0 and document.vehicle_ahead_m is None
-    if document.vehicle_ahead_m is None:
-        return True
-    ahead = (
-        other.mover.position_m - other.asset.size_m[0] - item.mover.position_m
-        for other in movers
-        if other.mover is not None and other.mover.lane == item.mover.lane and other.mover.position_m > item.mover.position_m
-    )
-    return any(0 <= gap <= document.vehicle_ahead_m for gap in ahead)
+    if wanted.min_road_ahead_m > 0 and (lane is None or lane.length_m - item.mover.position_m < wanted.min_road_ahead_m):
+        return False
+    return wanted.vehicle_ahead_m is None or street.gap_ahead_m(item, movers, wanted.vehicle_ahead_m) is not None
 
 
 def mount_pose(document: MountDocument, view: StreetView | None, path: str) -> Array:
@@ -320,9 +376,12 @@ def street_objects(
         if (item.asset.digest, level) not in drawn:
             drawn[item.asset.digest, level] = _drawn(item, level, context)
         asset = drawn[item.asset.digest, level]
-        key = (item.asset.digest, level, item.lit, item.paint)
+        hidden = tuple(document.ego.hide) if document.ego is not None and item is view.ego else ()
+        key = (item.asset.digest, level, item.lit, item.paint, hidden)
         if key not in parts:
-            parts[key] = tuple(_parts(asset, item, context))
+            parts[key] = tuple(part for part in _parts(asset, item, context) if not _matches(part.name, hidden))
+        if not parts[key]:
+            fail("scene.traffic.ego.hide", "leaves nothing of the ego; leave out a pattern, or set show: false.")
         objects.append(SceneObject(item.id, item.asset.asset_class, parts[key], item.to_world(), (asset.licence,)))
         lights += _beams(document, item, asset, context)
     if view.ego is not None and not document.ego_is_shown:
@@ -333,6 +392,10 @@ def street_objects(
     if far:
         context.warn(f"scene.traffic: {far} objects beyond range_m = {document.range_m:g} m from every camera are left out.")
     return objects, lights
+
+
+def _matches(name: str, patterns: Sequence[str]) -> bool:
+    return any(fnmatchcase(name, pattern) for pattern in patterns)
 
 
 def _beams(document: TrafficDocument, item: PlacedAsset, asset: DrawnAsset, context: Context) -> Iterator[SpotLight]:

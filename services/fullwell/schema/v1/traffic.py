@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from pydantic import Field, model_validator
 
 from fullwell.schema.v1.common import Count, Document, Flag, Id, NonNegative, Number, Range, Text, exactly_one, refuse
 
-__all__ = ["EgoDocument", "TargetDocument", "TrafficDocument", "TrafficKindName"]
+__all__ = ["DemandDocument", "EgoDocument", "KindDemandDocument", "TargetDocument", "TrafficDocument", "TrafficKindName"]
 
 TrafficKindName = Literal["car", "van", "bus", "lorry", "motorcycle", "cyclist", "tram", "pedestrian"]
 _Width = Annotated[float, Range(ge=0, le=20)]
@@ -16,7 +16,7 @@ _Layout = Literal["grid", "spider", "random", "straight", "curve", "cross", "tee
 
 
 class RoadNetworkDocument(Document):
-    """Roads: a `layout`, or a `file` (.net.xml of SUMO, .osm or .osm.xml of OpenStreetMap, .xodr of OpenDRIVE).
+    """Roads: a `layout`, or a `file` (.net.xml of SUMO, .osm or .osm.xml of OpenStreetMap, .xodr of OpenDRIVE; packed: .gz).
 
     Of a layout, `length_m` is that of a block (grid, random), between circles (spider), or from end to end; `size` is junctions
     along x and y (grid), arms and circles (spider), or iterations (random). Widths are those of one direction, 0 for none.
@@ -32,6 +32,7 @@ class RoadNetworkDocument(Document):
     parking_width_m: _Width = 0.0
     bike_lane_width_m: _Width = 0.0
     bus_lane_width_m: _Width = 0.0
+    tram_lane_width_m: _Width = 0.0
     speed_limit_m_s: Annotated[float, Range(gt=0, le=60)] = 13.9
     signals: Flag = True
     seed: Annotated[int, Range(ge=0, le=2**31 - 1, whole=True)] = 0
@@ -44,32 +45,78 @@ class RoadNetworkDocument(Document):
         return self
 
 
-class DemandDocument(Document):
+class KindDemandDocument(Document):
     """How much of one kind: new ones per second in the whole network, and how many per kilometre of lane at the start."""
 
     rate_per_s: Annotated[float, Range(ge=0, le=20)] = 0.0
     density_per_km: Annotated[float, Range(ge=0, le=300)] = 0.0
 
 
-class TrafficRunDocument(Document):
-    """The user's own SUMO run on the network: its fcd-output."""
+class DemandDocument(Document):
+    """How much traffic: a `preset` at a `level`, and kinds by themselves, which replace those of the preset."""
+
+    preset: Literal["city", "suburb", "rural", "motorway"] | None = None
+    level: Literal["low", "medium", "high"] = "medium"
+    car: KindDemandDocument | None = None
+    van: KindDemandDocument | None = None
+    bus: KindDemandDocument | None = None
+    lorry: KindDemandDocument | None = None
+    motorcycle: KindDemandDocument | None = None
+    cyclist: KindDemandDocument | None = None
+    tram: KindDemandDocument | None = None
+    pedestrian: KindDemandDocument | None = None
+
+    def by_kind(self) -> dict[TrafficKindName, KindDemandDocument]:
+        """Return the kinds that are given by themselves."""
+        given = {kind: getattr(self, kind) for kind in get_args(TrafficKindName)}
+        return {kind: entry for kind, entry in given.items() if entry is not None}
+
+
+class SignalStatesDocument(Document):
+    """States of traffic lights, as SUMO's timedEvent SaveTLSStates or SaveTLSSwitchStates writes them."""
 
     file: Text
+
+
+class TrafficRunDocument(Document):
+    """The user's own SUMO run: its fcd-output on the network, with `signals` where they are known; or a .sumocfg to run.
+
+    A configuration brings its network, unless the recipe has one.
+    """
+
+    file: Text
+    signals: SignalStatesDocument | None = None
+
+    @property
+    def is_configuration(self) -> bool:
+        """Whether SUMO is still to be run."""
+        return self.file.casefold().endswith((".sumocfg", ".sumo.cfg"))
+
+    @model_validator(mode="after")
+    def _signals_of_a_record(self) -> TrafficRunDocument:
+        if self.signals is not None and self.is_configuration:
+            refuse("is given for a configuration, which tells them itself; remove it.", "signals")
+        return self
 
 
 class EgoDocument(Document):
     """Which vehicle carries the cameras: `id`, or the first (by id) that meets all conditions. It is not drawn unless `show`.
 
-    `vehicle_ahead_m` asks for a vehicle in its lane within that distance.
+    `lane` is a pattern of SUMO's ids of lanes, such as "main_*"; `vehicle_ahead_m` asks for a vehicle on its way within that
+    distance, straight on through junctions. Conditions hold at `chosen_at_s`, time_s unless given: the same vehicle then has
+    the cameras at any time. Of a shown ego, parts whose names match a pattern of `hide` are left out ("glass*").
     """
 
     id: Text | None = None
     kind: TrafficKindName = "car"
     min_speed_m_s: NonNegative = 0.0
     max_speed_m_s: NonNegative | None = None
+    lane: Text | None = None
     vehicle_ahead_m: Annotated[float, Range(gt=0, le=500)] | None = None
     min_road_ahead_m: NonNegative = 0.0
+    chosen_at_s: Annotated[float, Range(ge=0, le=604_800)] | None = None
     show: Flag = False
+    hide: list[Text] = Field(default_factory=list, max_length=100)
 
 
 class TargetDocument(Document):
@@ -90,16 +137,16 @@ class TargetDocument(Document):
 
 
 class TrafficDocument(Document):
-    """A street with traffic by SUMO. `demand` by kind, or `run`; taken at `time_s` after the start.
+    """A street with traffic by SUMO. `demand`, or a `run`; taken at `time_s` after the start.
 
     `style` says how the street is dressed; `lamps` what is lit. Assets are the approved ones of the store unless `state` says
     otherwise, with one of `licence` where it is given.
     """
 
-    network: RoadNetworkDocument
-    demand: dict[TrafficKindName, DemandDocument] = Field(default_factory=dict)
+    network: RoadNetworkDocument | None = None
+    demand: DemandDocument | None = None
     run: TrafficRunDocument | None = None
-    time_s: Annotated[float, Range(ge=0, le=86_400)] = 60.0
+    time_s: Annotated[float, Range(ge=0, le=604_800)] = 60.0
     style: Text = "city"
     dressed: Flag = True
     lamps: Literal["day", "night"] = "day"
@@ -119,7 +166,9 @@ class TrafficDocument(Document):
 
     @model_validator(mode="after")
     def _one_traffic(self) -> TrafficDocument:
-        if self.run is not None and self.demand:
+        if self.network is None and (self.run is None or not self.run.is_configuration):
+            refuse("is missing; give a layout or a file, or a run of a .sumocfg, which brings its own.", "network")
+        if self.run is not None and self.demand is not None:
             refuse("is given together with run; remove one of them.", "demand")
         if self.targets and self.ego is None:
             refuse("are placed by the ego; give ego.", "targets")

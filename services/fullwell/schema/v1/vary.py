@@ -11,7 +11,7 @@ from fullwell.schema.errors import RecipeError
 from fullwell.schema.paths import parse_path
 from fullwell.schema.v1.common import Count, Document, Number, Positive, Range, Whole, refuse
 
-__all__ = ["Distribution", "RandomVariation", "VaryDocument"]
+__all__ = ["ClipDocument", "Distribution", "RandomVariation", "VaryDocument"]
 
 MAX_FRAMES = 1_000_000
 _FrameCount = Annotated[int, Range(ge=1, le=MAX_FRAMES, whole=True)]
@@ -113,15 +113,26 @@ class RandomVariation(Document):
     values: dict[str, Distribution] = Field(min_length=1, max_length=1000)
 
 
+class ClipDocument(Document):
+    """A clip of a traffic scene: `frames` moments at a frame rate, the first at scene.traffic.time_s.
+
+    An ego that is chosen by rules is chosen at the first and keeps the cameras.
+    """
+
+    frames: _FrameCount
+    frame_rate_hz: Annotated[float, Range(ge=0.01, le=1000)] = 10.0
+
+
 class VaryDocument(Document):
-    """Frames = product of the grid's list lengths x random.frames x repeat; the last of these varies fastest.
+    """Frames = product of the grid's list lengths x random.frames x clip.frames x repeat; the last of these varies fastest.
 
     `grid` (path: values) makes every combination, its last entry fastest. The draws of `random` are the same for every
-    point of the grid. `repeat` renders the same frame again with other noise.
+    point of the grid. `clip` lets traffic go on from frame to frame. `repeat` renders the same frame again with other noise.
     """
 
     grid: dict[str, Annotated[list[Any], Field(min_length=1, max_length=100_000)]] = Field(default_factory=dict)
     random: RandomVariation | None = None
+    clip: ClipDocument | None = None
     repeat: Count = 1
 
     @model_validator(mode="after")
@@ -141,4 +152,5 @@ class VaryDocument(Document):
     def frame_count(self) -> int:
         """Return the number of frames."""
         grid = math.prod(len(values) for values in self.grid.values())
-        return grid * (1 if self.random is None else self.random.frames) * self.repeat
+        draws = 1 if self.random is None else self.random.frames
+        return grid * draws * (1 if self.clip is None else self.clip.frames) * self.repeat
