@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from fullwell.labels.model import Labels, ObjectLabel
-from fullwell.scene.motion import AT_REST, DrivingFacts
+from fullwell.scene.motion import AT_REST, Motion
 
 __all__ = ["labels_document"]
 
@@ -16,16 +17,17 @@ _DECIMALS = 6
 
 
 def labels_document(
-    labels: Labels, intrinsics_px: Any, camera_to_world: Any, facts: DrivingFacts | None = None
+    labels: Labels, intrinsics_px: Any, camera_to_world: Any, motions: Mapping[str, Motion] | None = None
 ) -> dict[str, Any]:
     """Return `labels.json` as plain data: boxes in pixels, lengths in metres, camera axes as OpenCV.
 
-    With the facts of a street each object has its velocity over ground, along the axes of world and camera.
+    With `motions` {object id: motion} each object has its velocity over ground, along the axes of world and camera; objects
+    that are not named are at rest.
     """
     rows, cols = labels.instances.shape
     objects = [_object_document(item) for item in labels.objects]
-    if facts is not None:
-        motions, to_camera = facts.motions(), np.asarray(camera_to_world, dtype=np.float64)[:3, :3].T
+    if motions is not None:
+        to_camera = np.asarray(camera_to_world, dtype=np.float64)[:3, :3].T
         for entry in objects:
             velocity = motions.get(entry["id"], AT_REST).velocity_m_s
             entry["velocity"] = {"world_m_s": _numbers(velocity), "camera_m_s": _numbers(to_camera @ velocity)}

@@ -32,7 +32,7 @@ from fullwell.pipeline.stage_store import StageStore
 from fullwell.render import RenderedLight, choose_variant, query_depth, query_surfaces, render_light, tile_errors
 from fullwell.scene import Camera, ConstantEnvironment, Film, ImageEnvironment, SceneDescription, SunSky
 from fullwell.scene.images import OpticalImage, RawImage
-from fullwell.scene.motion import AT_REST
+from fullwell.scene.motion import Motion
 from fullwell.schema.frame import CameraRig, FrameDescription, SensorRig
 from fullwell.sensor import ChannelCurrents, SensorModel
 from fullwell.sensor.exposures import FixedExposure
@@ -358,7 +358,7 @@ def _sensor_products(
         with run.stage(f"{rig.camera.name}/{sensor.name}: labels"):
             labels = _labels(run, view)
         run.instance_table = labels.instance_table
-        _label_products(run, labels, view, folder)
+        _label_products(run, labels, view, rig.motion, folder)
     return document
 
 
@@ -451,18 +451,19 @@ def _lens_document(camera: Camera) -> dict[str, Any]:
     }
 
 
-def _label_products(run: _Run, labels: Labels, view: Camera, folder: str) -> None:
+def _label_products(run: _Run, labels: Labels, view: Camera, motion: Motion, folder: str) -> None:
     _add(run, f"{folder}depth.exr", lambda: encode.encode_depth_exr(labels.depth_z_m, labels.depth_range_m))
     _add(run, f"{folder}coverage.png", lambda: encode.encode_coverage_png(labels.coverage))
     _add(run, f"{folder}normals.exr", lambda: encode.encode_normals_exr(labels.normals_camera))
-    _add(run, f"{folder}flow.exr", lambda: encode.encode_flow_exr(_flow(run.frame, labels, view)))
+    _add(run, f"{folder}flow.exr", lambda: encode.encode_flow_exr(_flow(run.frame, labels, view, motion)))
     _add(run, f"{folder}instances.png", lambda: encode.encode_ids_png(labels.instances))
     _add(run, f"{folder}semantic.png", lambda: encode.encode_ids_png(labels.semantic.astype(np.uint32)))
-    driving = run.frame.driving
+    driving, motions = run.frame.driving, run.frame.motions
+    told = motions if motions or driving is not None else None
     _add(
         run,
         f"{folder}labels.json",
-        lambda: encode.encode_json(labels_document(labels, view.intrinsics_px, view.camera_to_world, driving)),
+        lambda: encode.encode_json(labels_document(labels, view.intrinsics_px, view.camera_to_world, told)),
     )
     if driving is not None:
         _add(run, f"{folder}driving.json", lambda: encode.encode_json(driving_document(labels, view, driving)))
@@ -471,14 +472,13 @@ def _label_products(run: _Run, labels: Labels, view: Camera, folder: str) -> Non
 _SKIES = (ConstantEnvironment, ImageEnvironment, SunSky)
 
 
-def _flow(frame: FrameDescription, labels: Labels, view: Camera) -> encode.FlowImage:
-    driving = frame.driving
+def _flow(frame: FrameDescription, labels: Labels, view: Camera, motion: Motion) -> encode.FlowImage:
     flow = optical_flow(
         labels,
         view,
-        {} if driving is None else driving.motions(),
+        frame.motions,
         interval_s=frame.flow_interval_s,
-        camera_motion=AT_REST if driving is None else driving.motion_of_camera(view.name),
+        camera_motion=motion,
         has_sky=any(isinstance(light, _SKIES) for light in frame.scene.lights),
     )
     return encode.FlowImage(flow, frame.flow_interval_s)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import json
 import math
@@ -19,14 +20,19 @@ from fullwell.schema.v1.recipe import LabelsDocument, QualityDocument, RecipeDoc
 from fullwell.schema.variation import extreme_values, frame_values
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from fullwell.radiometry.grid import WavelengthGrid
     from fullwell.scene import Film
-    from fullwell.scene.motion import DrivingFacts
+    from fullwell.scene.motion import DrivingFacts, Motion
     from fullwell.schema.assets import StoredAssetFiles
     from fullwell.schema.conversion.context import Context, RecipeFiles
     from fullwell.schema.conversion.scenes import PlacedScene
     from fullwell.schema.conversion.traffic import StreetView, Viewpoint
     from fullwell.schema.frame import CameraRig, FrameDescription, Quality, View
+    from fullwell.schema.v1.cameras import PoseDocument
+    from fullwell.schema.v1.common import MotionDocument
 
 __all__ = ["RecipeBuilder", "build_frame", "frame_document", "validate", "varied_document"]
 
@@ -147,6 +153,11 @@ class RecipeBuilder:
         if self._views is None:
             self._views = self._shared_views(context)
         _check_cameras_outside(cameras, placed)
+        driving = _driving(recipe, context.street, cameras)
+        cameras = tuple(
+            dataclasses.replace(rig, motion=_camera_motion(camera.pose, rig, driving))
+            for camera, rig in zip(recipe.cameras, cameras, strict=True)
+        )
         _name_drawn(plain, of_scene.drawn_assets)
         plain |= {"files": dict(sorted((of_scene.used_files | context.used_files).items()))}
         return FrameDescription(
@@ -164,8 +175,9 @@ class RecipeBuilder:
             recipe_json=canonical_json(plain).decode(),
             group_weights=tuple(sorted(recipe.scene.light_groups.items())),
             views=_views_on(self._views, cameras, tuple(sorted(recipe.scene.light_groups.items()))),
-            driving=_driving(recipe, context.street, cameras),
+            driving=driving,
             flow_interval_s=(recipe.labels or LabelsDocument()).flow_interval_s,
+            motions=_motions(recipe, placed, driving),
         )
 
     def _placed(
@@ -236,6 +248,34 @@ def _driving(recipe: RecipeDocument, street: StreetView | None, cameras: tuple[C
     return driving_facts(street, places_m=places, range_m=recipe.scene.traffic.range_m, mounted=mounted)
 
 
+def _motions(recipe: RecipeDocument, placed: PlacedScene, driving: DrivingFacts | None) -> dict[str, Motion]:
+    """Return the motions of traffic and of the recipe's own objects, by id; what is at rest is left out."""
+    found = {} if driving is None else dict(driving.motions())
+    places = {item.id: item.to_world[:3, 3] for item in placed.description.objects}
+    for item in recipe.scene.objects:
+        if item.motion is not None:
+            motion = _motion(item.motion, places[item.id])
+            if motion.moves:
+                found[item.id] = motion
+    return found
+
+
+def _camera_motion(pose: PoseDocument, rig: CameraRig, driving: DrivingFacts | None) -> Motion:
+    from fullwell.scene.motion import AT_REST  # noqa: PLC0415
+
+    if pose.motion is not None:
+        return _motion(pose.motion, rig.camera.camera_to_world[:3, 3])
+    return AT_REST if driving is None else driving.motion_of_camera(rig.camera.name)
+
+
+def _motion(document: MotionDocument, pivot_m: NDArray[np.float64]) -> Motion:
+    import numpy as np  # noqa: PLC0415
+
+    from fullwell.scene.motion import Motion  # noqa: PLC0415
+
+    return Motion(np.array(document.velocity_m_s), math.radians(document.yaw_rate_deg_per_s), np.array(pivot_m))
+
+
 def _viewpoints(cameras: tuple[CameraRig, ...]) -> tuple[Viewpoint, ...]:
     """Return where cameras are and how finely they see: what levels of detail are chosen by."""
     from fullwell.schema.conversion.traffic import Viewpoint  # noqa: PLC0415
@@ -301,6 +341,7 @@ def _quality(document: QualityDocument) -> Quality:
         time_limit_s=document.time_limit_s,
         max_sample_saturation=document.max_sample_saturation,
         max_depth=document.max_depth,
+        motion_blur_px=document.motion_blur_px,
     )
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
 from fullwell.isp.parameters import IspSettings
 from fullwell.optics import IDEAL_LENS, OpticsOptions
 from fullwell.radiometry import WavelengthGrid
 from fullwell.scene import Camera, SceneDescription
-from fullwell.scene.motion import DrivingFacts
+from fullwell.scene.motion import AT_REST, DrivingFacts, Motion
 from fullwell.sensor.parameters import Exposure, SensorModel
 
 __all__ = ["PRODUCTS", "CameraRig", "FrameDescription", "Quality", "SensorRig", "View"]
@@ -49,6 +50,8 @@ class Quality:
         Clamp of single samples, in lights that fill the well; None for none.
     max_depth
         Segments of the longest path.
+    motion_blur_px
+        Shift in the picture, in pixels of the sensor, below which what moves is rendered standing still.
     """
 
     noise_ratio: float | None = 0.5
@@ -57,6 +60,7 @@ class Quality:
     time_limit_s: float | None = None
     max_sample_saturation: float | None = None
     max_depth: int = 8
+    motion_blur_px: float = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,6 +84,8 @@ class CameraRig:
     """Whose camera it is: the physically right one, or ISETCam's with its quirks, to compare numbers with it."""
     depth_layers: bool = False
     """Whether depth of field is made from a sharp picture and its depths; the camera's lens is then a pinhole with a focus."""
+    motion: Motion = AT_REST
+    """Of the camera, about its pose."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,6 +121,8 @@ class FrameDescription:
         What labels may tell of a street; None without traffic.
     flow_interval_s
         Time from this frame to the one that optical flow leads to [s].
+    motions
+        Of the objects that move, by id: about where they are at the frame's own time, the middle of the exposure.
     """
 
     recipe_name: str
@@ -133,3 +141,4 @@ class FrameDescription:
     views: tuple[tuple[View, ...], ...] = ()
     driving: DrivingFacts | None = None
     flow_interval_s: float = 0.1
+    motions: Mapping[str, Motion] = field(default_factory=dict)

@@ -242,7 +242,7 @@ def test_labels_of_streets_have_the_velocities_too(labels: Labels, document: dic
     camera = forward_camera()
     plain = labels_document(labels, camera.intrinsics_px, camera.camera_to_world)
     assert not any("velocity" in item for item in plain["objects"])
-    told = labels_document(labels, camera.intrinsics_px, camera.camera_to_world, FACTS)
+    told = labels_document(labels, camera.intrinsics_px, camera.camera_to_world, FACTS.motions())
     velocities = {item["id"]: item["velocity"] for item in told["objects"]}
     for name, item in objects(document).items():
         assert velocities[name] == item["velocity"]

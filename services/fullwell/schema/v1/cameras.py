@@ -13,6 +13,7 @@ from fullwell.schema.v1.common import (
     Flag,
     Fraction,
     MatrixRows,
+    MotionDocument,
     Name,
     NonNegative,
     Number,
@@ -76,7 +77,8 @@ class MountDocument(Document):
 class PoseDocument(Document):
     """Where the camera is: `origin_m`, `target_m` and `up`, or `matrix`, or `mount` on a traffic scene's ego.
 
-    `matrix` is the 4 x 4 rigid camera-to-world transform, camera axes x right, y down, z forward.
+    `matrix` is the 4 x 4 rigid camera-to-world transform, camera axes x right, y down, z forward. `motion` says how the camera
+    moves; one that is mounted moves with the ego.
     """
 
     origin_m: Point | None = None
@@ -84,12 +86,15 @@ class PoseDocument(Document):
     up: Direction | None = None
     matrix: MatrixRows | None = None
     mount: MountDocument | None = None
+    motion: MotionDocument | None = None
 
     @model_validator(mode="after")
     def _one_way(self) -> PoseDocument:
         if self.mount is not None:
             if (self.origin_m, self.target_m, self.up, self.matrix) != (None, None, None, None):
                 refuse("gives the pose twice; give mount alone, or no mount.")
+            if self.motion is not None:
+                refuse("is given beside mount; the camera moves as the ego does. Remove one of them.", "motion")
             return self
         points = [self.origin_m, self.target_m]
         ways = "give origin_m and target_m (and up), or matrix."

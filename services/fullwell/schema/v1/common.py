@@ -21,6 +21,7 @@ __all__ = [
     "Id",
     "Length",
     "MatrixRows",
+    "MotionDocument",
     "Name",
     "NonNegative",
     "Number",
@@ -249,6 +250,17 @@ class Document(BaseModel):
     def keys(cls) -> list[str]:
         """Return the keys that the document may have, as they are written."""
         return [field.alias or name for name, field in cls.model_fields.items()]
+
+
+class MotionDocument(Document):
+    """How a rigid thing moves while the picture is taken. The recipe says where it is at the frame's own time.
+
+    `velocity_m_s` is along the world's axes; `yaw_rate_deg_per_s` turns it about the vertical through its own origin,
+    counter-clockwise from above.
+    """
+
+    velocity_m_s: Annotated[tuple[float, float, float], _Vector(3, Range(ge=-1e4, le=1e4))] = (0.0, 0.0, 0.0)
+    yaw_rate_deg_per_s: Annotated[float, Range(ge=-36_000, le=36_000)] = 0.0
 
 
 def exactly_one(document: Document, *keys: str) -> str:

@@ -17,6 +17,7 @@ from fullwell.schema.v1.common import (
     Fraction,
     Group,
     Id,
+    MotionDocument,
     NonNegative,
     Number,
     Range,
@@ -112,7 +113,7 @@ class ObjectDocument(Document):
     """What labels count as one thing: a `geometry` with a `material`, or several `parts`.
 
     Model files bring materials; `material` replaces all of them, `materials` those whose part name matches a pattern such
-    as "wheel*". `inside_ok` says that a camera may be inside (a room, a dome).
+    as "wheel*". `inside_ok` says that a camera may be inside (a room, a dome). `motion` says how the object moves.
     """
 
     id: Id
@@ -122,6 +123,7 @@ class ObjectDocument(Document):
     materials: dict[str, MaterialReference] = Field(default_factory=dict)
     parts: list[PartDocument] | None = Field(default=None, min_length=1, max_length=100_000)
     transform: Transform | None = None
+    motion: MotionDocument | None = None
     inside_ok: Flag = False
     licences: list[Text] = Field(default_factory=list)
 
@@ -211,7 +213,8 @@ class QualityDocument(Document):
     there, with at most `max_samples_per_pixel` and, where given, within `time_limit_s` (results then depend on the machine).
     `samples_per_pixel` asks for equal samples everywhere instead. `max_sample_saturation` clamps single samples to that many
     times the light that fills the sensor's well: less noise from rare bright paths, at the price of a little light, whose
-    amount is measured. `oversampling` is the number of film samples along the side of the finest pixel.
+    amount is measured. `oversampling` is the number of film samples along the side of the finest pixel. What moves by less than
+    `motion_blur_px` pixels while the picture is taken is rendered as if it stood still.
     """
 
     noise_ratio: Annotated[float, Range(ge=0.01, le=100)] | None = None
@@ -221,6 +224,7 @@ class QualityDocument(Document):
     max_sample_saturation: Annotated[float, Range(ge=1)] | None = None
     max_depth: Annotated[int, Range(ge=1, le=1000, whole=True)] = 8
     oversampling: Annotated[int, Range(ge=1, le=16, whole=True)] = 1
+    motion_blur_px: Annotated[float, Range(gt=0, le=1e6)] = 0.25
 
     @model_validator(mode="after")
     def _one_way(self) -> QualityDocument:
