@@ -14,7 +14,7 @@ from typing import Final, Literal
 from fullwell.core.errors import unknown_name_message
 from fullwell.core.hashing import sha256_hex
 from fullwell.traffic.sumo import SumoLimits, TrafficError, run_sumo_program, sumo_home
-from fullwell.traffic.templates import TEMPLATE_NAMES, CrossSection, template
+from fullwell.traffic.templates import TEMPLATE_NAMES, CrossSection, PlainNetwork, template, with_section
 
 __all__ = ["GENERATED_NAMES", "NetworkFile", "NetworkSpec", "make_network", "read_road_file"]
 
@@ -107,27 +107,28 @@ _COMMON: Final = ("--no-turnarounds.except-deadend", "true", "--junctions.corner
 
 def _drawn(spec: NetworkSpec, folder: Path, path: str, limits: SumoLimits | None) -> tuple[str, ...]:
     plain = template(spec.layout, spec.section, length_m=spec.length_m, signals=spec.signals)
+    return _joined(plain, spec, folder, path, limits)
+
+
+def _joined(plain: PlainNetwork, spec: NetworkSpec, folder: Path, path: str, limits: SumoLimits | None) -> tuple[str, ...]:
+    """Make a network of nodes and edges, with crossings where there are sidewalks."""
     (folder / "in.nod.xml").write_text(plain.nodes)
     (folder / "in.edg.xml").write_text(plain.edges)
     arguments = ["--node-files", "in.nod.xml", "--edge-files", "in.edg.xml", "--output-file", "out.net.xml", *_COMMON]
     arguments += ["--crossings.guess", "true", "--walkingareas", "true"] if spec.section.sidewalk_width_m > 0 else []
     arguments += ["--roundabouts.guess", "true", "--default.junctions.radius", "6", "--no-internal-links", "false"]
-    return run_sumo_program(
-        "netconvert", arguments, folder=folder, path=path, what=f"the layout {spec.layout!r}", limits=limits
-    )
+    what = f"the layout {spec.layout!r}"
+    return run_sumo_program("netconvert", arguments, folder=folder, path=path, what=what, limits=limits)
 
 
 def _generated(spec: NetworkSpec, folder: Path, path: str, limits: SumoLimits | None) -> tuple[str, ...]:
+    """Let netgenerate say where junctions are and what joins them; lanes are those of the cross-section."""
     first, second = spec.size
     shape = {
         "grid": [
-            "--grid",
-            "--grid.x-number",
-            f"{first}",
-            "--grid.y-number",
-            f"{second}",
-            "--grid.length",
-            f"{spec.length_m:g}",
+            *("--grid", "--grid.x-number", f"{first}", "--grid.y-number", f"{second}", "--grid.length", f"{spec.length_m:g}"),
+            # Roads that lead in and out, so that junctions at the edge are real ones.
+            *("--grid.attach-length", f"{0.5 * spec.length_m:g}"),
         ],
         "spider": [
             *("--spider", "--spider.arm-number", f"{first}", "--spider.circle-number", f"{second}"),
@@ -138,21 +139,13 @@ def _generated(spec: NetworkSpec, folder: Path, path: str, limits: SumoLimits | 
             *("--rand.max-distance", f"{1.5 * spec.length_m:g}", "--rand.min-angle", "60"),
         ],
     }[spec.layout]
-    if spec.layout == "grid":  # roads that lead in and out, so that junctions at the edge are real ones
-        shape += ["--grid.attach-length", f"{0.5 * spec.length_m:g}"]
-    section = spec.section
-    arguments = [*shape, "--output-file", "out.net.xml", "--seed", f"{spec.seed}", *_COMMON]
-    arguments += ["--default.lanenumber", f"{section.lanes}", "--default.lanewidth", f"{section.lane_width_m:g}"]
-    arguments += ["--default.speed", f"{section.speed_m_s:g}", "--default.junctions.radius", "6"]
-    if section.sidewalk_width_m > 0:
-        arguments += ["--sidewalks.guess", "true", "--default.sidewalk-width", f"{section.sidewalk_width_m:g}"]
-        arguments += ["--sidewalks.guess.max-speed", f"{section.speed_m_s + 0.1:g}", "--crossings.guess", "true"]
-    if section.bike_lane_width_m > 0:
-        arguments += ["--bikelanes.guess", "true", "--default.bikelane-width", f"{section.bike_lane_width_m:g}"]
+    arguments = [*shape, "--plain-output-prefix", "plain", "--seed", f"{spec.seed}", *_COMMON]
+    arguments += ["--default.speed", f"{spec.section.speed_m_s:g}"]
     arguments += ["--tls.guess", "true", "--tls.guess.threshold", "20"] if spec.signals else []
-    return run_sumo_program(
-        "netgenerate", arguments, folder=folder, path=path, what=f"the layout {spec.layout!r}", limits=limits
-    )
+    what = f"the layout {spec.layout!r}"
+    warnings = run_sumo_program("netgenerate", arguments, folder=folder, path=path, what=what, limits=limits)
+    nodes, edges = ((folder / f"plain.{kind}.xml").read_text() for kind in ("nod", "edg"))
+    return (*warnings, *_joined(with_section(nodes, edges, spec.section), spec, folder, path, limits))
 
 
 def _from_file(file: Path, folder: Path, path: str, limits: SumoLimits | None) -> tuple[str, ...]:

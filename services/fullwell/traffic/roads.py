@@ -6,7 +6,7 @@ import math
 import re
 import tempfile
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -43,6 +43,8 @@ class Lane:
         Width, and speed limit.
     street
         Name of the street, empty where unknown.
+    has_rails
+        Whether trams or trains may use it, alone or with others.
     """
 
     id: str
@@ -53,6 +55,7 @@ class Lane:
     width_m: float
     speed_m_s: float
     street: str = ""
+    has_rails: bool = False
 
     @property
     def length_m(self) -> float:
@@ -104,6 +107,8 @@ class RoadNetwork:
         follows, see `to_map`.
     successors
         {edge: the edges that connections lead to}.
+    classes
+        {(edge, edge that follows): SUMO's classes of vehicles that may go on so}.
     """
 
     file: NetworkFile
@@ -113,13 +118,15 @@ class RoadNetwork:
     origin_m: Array
     location: Mapping[str, str]
     successors: Mapping[str, tuple[str, ...]]
+    classes: Mapping[tuple[str, str], frozenset[str]] = field(default_factory=dict)
 
-    def reachable(self, edge: str) -> frozenset[str]:
-        """Return the edges that some vehicle can come to from an edge, itself among them."""
+    def reachable(self, edge: str, *, vclass: str = "") -> frozenset[str]:
+        """Return the edges that a vehicle (of a class of SUMO's, where given) can come to from an edge, itself among them."""
         seen, ahead = {edge}, [edge]
         while ahead:
-            for following in self.successors.get(ahead.pop(), ()):
-                if following not in seen:
+            here = ahead.pop()
+            for following in self.successors.get(here, ()):
+                if following not in seen and (not vclass or vclass in self.classes.get((here, following), ())):
                     seen.add(following)
                     ahead.append(following)
         return frozenset(seen)
@@ -167,7 +174,9 @@ def read_network(file: NetworkFile, *, path: str = "scene.traffic.network") -> R
         lanes = [_moved_lane(lane, origin) for lane in lanes]
         junctions = [Junction(item.id, item.kind, item.centre_m - origin, item.outline_m - origin) for item in junctions]
     location = {str(key): str(value) for key, value in net._location.items()}
-    return RoadNetwork(file, tuple(lanes), tuple(junctions), tuple(_signals(net)), origin, location, _successors(net))
+    return RoadNetwork(
+        file, tuple(lanes), tuple(junctions), tuple(_signals(net)), origin, location, _successors(net), _classes(net)
+    )
 
 
 def _sumo_net(file: NetworkFile, path: str) -> Any:
@@ -185,13 +194,32 @@ def _sumo_net(file: NetworkFile, path: str) -> Any:
 def _lanes(net: Any) -> Iterator[Lane]:
     for edge in net.getEdges(withInternal=True):
         for lane in edge.getLanes():
-            kind = _kind(edge.getFunction(), set(lane.getPermissions()))
+            permissions = set(lane.getPermissions())
+            kind = _kind(edge.getFunction(), permissions)
             shape = _points(lane.getShape3D())
             if len(shape) < 2:
                 continue
             width = float(lane.getWidth()) or _DEFAULT_WIDTHS_M.get(kind, 3.2)
             name = str(edge.getName() or "")
-            yield Lane(lane.getID(), edge.getID(), lane.getIndex(), kind, shape, width, float(lane.getSpeed()), name)
+            yield Lane(
+                lane.getID(),
+                edge.getID(),
+                lane.getIndex(),
+                kind,
+                shape,
+                width,
+                speed_m_s=float(lane.getSpeed()),
+                street=name,
+                # A lane that is open to all without a word is none with rails.
+                has_rails=bool(permissions & (_RAIL_CLASSES - {"subway"})) and not _is_open_to_all(permissions),
+            )
+
+
+_RAIL_CLASSES: Final = frozenset({"tram", "rail", "rail_urban", "rail_electric", "rail_fast", "subway"})
+
+
+def _is_open_to_all(permissions: set[str]) -> bool:
+    return {"tram", "rail", "ship", "passenger"} <= permissions
 
 
 def _kind(function: str, permissions: set[str]) -> LaneKind:
@@ -205,7 +233,7 @@ def _kind(function: str, permissions: set[str]) -> LaneKind:
         return "drive"
     if permissions & {"bus", "coach", "delivery", "truck"}:
         return "bus"
-    if permissions & {"tram", "rail", "rail_urban", "rail_electric", "rail_fast", "subway"}:
+    if permissions & _RAIL_CLASSES:
         return "rail"
     if "bicycle" in permissions:
         return "bike"
@@ -233,6 +261,15 @@ def _successors(net: Any) -> dict[str, tuple[str, ...]]:
     return {edge.getID(): tuple(sorted(other.getID() for other in edge.getOutgoing())) for edge in net.getEdges()}
 
 
+def _classes(net: Any) -> dict[tuple[str, str], frozenset[str]]:
+    allowed: dict[tuple[str, str], frozenset[str]] = {}
+    for edge in net.getEdges():
+        for other, connections in edge.getOutgoing().items():
+            lanes = ((item.getFromLane().getPermissions(), item.getToLane().getPermissions()) for item in connections)
+            allowed[edge.getID(), other.getID()] = frozenset().union(*(set(start) & set(end) for start, end in lanes))
+    return allowed
+
+
 def _points(shape: Any) -> Array:
     points = np.array([[*point, 0.0][:3] for point in shape], dtype=np.float64).reshape(-1, 3)
     if len(points) > 1:  # coincident points have no direction
@@ -250,4 +287,4 @@ def _origin(lanes: list[Lane]) -> Array:
 
 
 def _moved_lane(lane: Lane, origin: Array) -> Lane:
-    return Lane(lane.id, lane.edge_id, lane.index, lane.kind, lane.centre_m - origin, lane.width_m, lane.speed_m_s, lane.street)
+    return replace(lane, centre_m=lane.centre_m - origin)

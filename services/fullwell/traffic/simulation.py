@@ -296,7 +296,7 @@ def _trips(
             )
         chosen = [model for model in models if model.kind == kind and model.weight > 0]
         weights = np.array([model.weight for model in chosen]) / sum(model.weight for model in chosen)
-        choice = _EndChoice(network, edges, walks=kind == "pedestrian")
+        choice = _EndChoice(network, edges, kind)
         lanes_km = sum(lane.length_m for lane in edges.values()) / 1000.0
         rate += entry_rate * choice.ways_in
         density += 1000.0 * entry_rate / _usual_speed_m_s(kind, list(edges.values()))
@@ -332,7 +332,7 @@ def _arrivals(rng: np.random.Generator, rate_per_s: float, end_s: float) -> list
 
 
 def _usable_edges(network: RoadNetwork, kind: TrafficKind) -> dict[str, Lane]:
-    """Return for each edge that the kind may start on its longest such lane."""
+    """Return for each edge that the kind may start on its first such lane."""
     allowed: dict[str, tuple[str, ...]] = {
         "pedestrian": ("sidewalk",),
         "cyclist": ("bike", "drive"),
@@ -341,7 +341,8 @@ def _usable_edges(network: RoadNetwork, kind: TrafficKind) -> dict[str, Lane]:
     }
     edges: dict[str, Lane] = {}
     for lane in network.lanes:
-        if lane.kind in allowed.get(kind, ("drive",)) and lane.length_m >= 8.0:
+        on_rails = kind == "tram" and lane.has_rails and lane.kind in ("drive", "bus")
+        if (lane.kind in allowed.get(kind, ("drive",)) or on_rails) and lane.length_m >= 8.0:
             edges.setdefault(lane.edge_id, lane)
     return dict(sorted(edges.items()))
 
@@ -349,9 +350,10 @@ def _usable_edges(network: RoadNetwork, kind: TrafficKind) -> dict[str, Lane]:
 class _EndChoice:
     """Where trips of a kind begin and end: from the network's border to its border, where there is one."""
 
-    def __init__(self, network: RoadNetwork, edges: Mapping[str, Lane], *, walks: bool) -> None:
+    def __init__(self, network: RoadNetwork, edges: Mapping[str, Lane], kind: TrafficKind) -> None:
         self.edges = edges
-        self._network, self._walks = network, walks
+        self._network, self._walks = network, kind == "pedestrian"
+        self._vclass = _VCLASSES[kind]
         self._names = list(edges)
         border = [junction.centre_m[:2] for junction in network.junctions if junction.kind == "dead_end"]
         places = np.array(border).reshape(-1, 2)
@@ -370,11 +372,15 @@ class _EndChoice:
         starts = self._names if spread else self._starts
         start = starts[int(rng.integers(len(starts)))]
         if start not in self._goals:
-            there = frozenset(self._names) if self._walks else self._network.reachable(start) & frozenset(self._names)
+            there = frozenset(self._names) if self._walks else self._reachable(start) & frozenset(self._names)
             beyond = there - {start}
-            self._goals[start] = sorted(beyond & self._ends) or sorted(beyond) or [start]
+            leaves = start in self._ends and not self._walks  # who is on his way out goes on: no turning at the border
+            self._goals[start] = [start] if leaves else sorted(beyond & self._ends) or sorted(beyond) or [start]
         goals = self._goals[start]
         return start, goals[int(rng.integers(len(goals)))]
+
+    def _reachable(self, edge: str) -> frozenset[str]:
+        return self._network.reachable(edge, vclass=self._vclass)
 
 
 def _trip(

@@ -29,6 +29,10 @@ _DASH_M: Final = (3.0, 6.0)
 _FAST_DASH_M: Final = (6.0, 12.0)
 _STOP_LINE_M: Final = 0.5
 _STRIPE_M: Final = (0.5, 0.5)
+_GAUGE_M: Final = 1.435
+"""Between the inner edges of the rails: standard gauge."""
+_RAIL_HEAD_M: Final = 0.056
+"""Width of the head of a grooved rail 60R2 (EN 14811); its groove is not modelled, and it lies as high as markings do."""
 _FAST_M_S: Final = 20.0
 _MARGIN_M: Final = 300.0
 _FINE_M: Final = 4.0
@@ -46,6 +50,7 @@ class RoadStyle:
     kerb: str = "stone/granite"
     ground: str = "grass/green"
     mark: str = "line/white_thermoplastic"
+    rail: str = "metal/steel_brushed"
     edge_lines: bool = False
     zebra: bool = True
 
@@ -111,7 +116,7 @@ def ground_plan(network: RoadNetwork) -> GroundPlan:
 def road_surfaces(
     network: RoadNetwork, plan: GroundPlan, style: RoadStyle, *, margin_m: float = _MARGIN_M
 ) -> list[RoadSurface]:
-    """Return everything on the ground: road, sidewalk, kerb, marking, and terrain to `margin_m` beyond the roads."""
+    """Return everything on the ground: road, sidewalk, kerb, marking, rail, and terrain to `margin_m` beyond the roads."""
     heights = plan.heights
     kerb = plan.walk.difference(plan.walk.buffer(-_KERB_WIDTH_M, join_style="mitre")).intersection(
         plan.carriageway.buffer(2 * _KERB_WIDTH_M)
@@ -128,6 +133,7 @@ def road_surfaces(
         _flat("terrain", style.ground, ground, heights, terrain_m),
         _walls("terrain", style.ground, ground, heights, terrain_m),
         _ribbons("marking", style.mark, _marks(network, style)),
+        _ribbons("rail", style.rail, _rails(network)),
     ]
     merged: dict[tuple[str, str], list[RoadSurface]] = {}
     for surface in surfaces:
@@ -263,6 +269,20 @@ def _stop_lines(network: RoadNetwork) -> Iterator[Mark]:
         if lane.id in controlled and whole > 6.0:
             middle = cut(lane.centre_m, whole - 0.15 - _STOP_LINE_M, whole - 0.15)
             yield middle, lane.width_m - 0.3
+
+
+def _rails(network: RoadNetwork) -> Iterator[Mark]:
+    """Yield both rails of each track, through junctions too; where tracks cross or join, rails lie on one another."""
+    for lane in network.lanes:
+        if lane.has_rails and lane.kind in ("drive", "bus", "rail", "internal") and not _turns_back(lane):
+            for side in (-0.5, 0.5):
+                yield offset(lane.centre_m, side * (_GAUGE_M + _RAIL_HEAD_M)), _RAIL_HEAD_M
+
+
+def _turns_back(lane: Lane) -> bool:
+    """Return whether a lane ends against its own direction, as those do that join the lanes of a dead end."""
+    first, last = (lane.at(place)[1][:2] for place in (0.0, lane.length_m))
+    return float(first @ last) < -0.5
 
 
 def _ribbons(name: str, material: str, marks: Iterable[Mark]) -> RoadSurface:

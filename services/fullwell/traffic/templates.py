@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final
+from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
-__all__ = ["PARKING", "TEMPLATE_NAMES", "CrossSection", "PlainNetwork", "template"]
+__all__ = ["PARKING", "TEMPLATE_NAMES", "CrossSection", "PlainNetwork", "template", "with_section"]
 
 Point = tuple[float, float]
 
@@ -39,7 +40,7 @@ class CrossSection:
         rows += [("bicycle", self.bike_lane_width_m), ("bus taxi", self.bus_lane_width_m)]
         given = [f'allow="{who}" width="{width:g}"' for who, width in rows if width > 0]
         # Bicycles ride on the road where they have no lane; pedestrians only where there is no sidewalk.
-        barred = ["tram rail rail_urban rail_electric rail_fast ship"]
+        barred = ["tram rail rail_urban rail_electric rail_fast subway ship"]
         barred += ["pedestrian"] if self.sidewalk_width_m > 0 else []
         barred += ["bicycle"] if self.bike_lane_width_m > 0 else []
         given += [f'disallow="{" ".join(barred)}" width="{self.lane_width_m:g}"'] * self.lanes
@@ -65,6 +66,15 @@ class PlainNetwork:
 
     nodes: str
     edges: str
+
+
+def with_section(nodes: str, edges: str, section: CrossSection) -> PlainNetwork:
+    """Return a network of node and edge files with other lanes: those of a cross-section on every edge."""
+    drawing = _Drawing(section)
+    for edge in ElementTree.fromstring(edges).iter("edge"):
+        points = [tuple(float(part) for part in point.split(",")[:2]) for point in edge.get("shape", "").split()]
+        drawing.one_way(edge.attrib["id"], edge.attrib["from"], edge.attrib["to"], [(x, y) for x, y in points])
+    return PlainNetwork(nodes, drawing.text().edges)
 
 
 class _Drawing:
@@ -138,9 +148,9 @@ def _tee(section: CrossSection, length_m: float, signals: bool) -> PlainNetwork:
 
 
 def _roundabout(section: CrossSection, length_m: float, signals: bool) -> PlainNetwork:
-    """Four arms into a ring of one lane, driven counter-clockwise."""
+    """Four arms into a ring of one lane, driven counter-clockwise; trams do not go round it."""
     del signals
-    drawing = _Drawing(section)
+    drawing = _Drawing(replace(section, tram_lane_width_m=0.0))
     radius_m = 14.0 + section.lane_width_m
     ring = CrossSection(lanes=1, lane_width_m=max(section.lane_width_m, 4.5), sidewalk_width_m=0.0, speed_m_s=8.3)
     count, steps = 4, 8
@@ -166,7 +176,7 @@ def _motorway(section: CrossSection, length_m: float, signals: bool) -> PlainNet
     lanes = max(2, section.lanes)
     width_m = max(section.lane_width_m, 3.5)
     middle_m = 2.0
-    attributes = 'disallow="pedestrian bicycle moped tram rail rail_urban rail_electric rail_fast ship"'
+    attributes = 'disallow="pedestrian bicycle moped tram rail rail_urban rail_electric rail_fast subway ship"'
     elements = '<lane index="0" allow="emergency" width="2.5"/>' + "".join(
         f'<lane index="{index + 1}" {attributes} width="{width_m:g}"/>' for index in range(lanes)
     )
