@@ -26,7 +26,7 @@ from fullwell.traffic.roads import Lane, RoadNetwork
 from fullwell.traffic.sumo import TrafficError
 from fullwell.traffic.surfaces import KERB_HEIGHT_M, GroundPlan, RoadStyle
 
-__all__ = ["CAR_PAINTS", "STYLES", "StreetStyle", "draw_paint", "dress", "pivot_of_pole", "street_style"]
+__all__ = ["CAR_PAINTS", "STYLES", "StreetStyle", "draw_paint", "dress", "pivot_of_pole", "street_style", "with_lights"]
 
 Array = NDArray[np.float64]
 
@@ -177,7 +177,7 @@ def dress(
     site = _Site(network, plan, style, shelf, Footprints(), seed)
     for rule in (_signals, _signs, _street_lights, _buildings, _furniture, _trees, _parked, _gardens, _layers):
         rule(site)
-    return tuple(_with_lights(item) for item in site.placed) if lights_on else tuple(site.placed)
+    return tuple(with_lights(item) for item in site.placed) if lights_on else tuple(site.placed)
 
 
 _LIT: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
@@ -185,7 +185,8 @@ _LIT: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
 )
 
 
-def _with_lights(item: PlacedAsset) -> PlacedAsset:
+def with_lights(item: PlacedAsset) -> PlacedAsset:
+    """Return a thing with the lamps lit that it has on at night."""
     patterns = _LIT.get(item.asset.asset_class, ())
     if item.role == "building":
         patterns = ("lit_windows*", "shop_windows*", "lobby_windows*", "sign_panel*")

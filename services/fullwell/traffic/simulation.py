@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from fullwell.core.rng import stream
 from fullwell.traffic.own_runs import OwnRun
 from fullwell.traffic.roads import Lane, RoadNetwork
+from fullwell.traffic.stops import BusStop, stop_elements
 from fullwell.traffic.sumo import SumoLimits, TrafficError, run_sumo_program
 from fullwell.traffic.trajectories import MoverType, TrafficFrame, TrafficKind, read_fcd, read_signal_states
 
@@ -51,6 +52,8 @@ _STEP_S: Final = 0.1
 """SUMO's step; at 1 s lane changes and stops are jerky."""
 _AROUND_S: Final = 1.1
 """Steps this long before and after the wanted moments are written too: they tell how things turn and what lies between."""
+_HALT_S: Final = (10.0, 25.0)
+"""Least and most that a bus stands at a stop."""
 _MOST_TRIPS: Final = 20_000
 _BORDER_M: Final = 15.0
 """How near a road must end to a dead end to lead into or out of the network."""
@@ -103,12 +106,13 @@ def simulate(
     *,
     seed: int,
     times_s: Sequence[float],
+    stops: Sequence[BusStop] = (),
     path: str = "scene.traffic",
     limits: SumoLimits | None = None,
 ) -> TrafficRun:
     """Return the traffic at `times_s` [s] after an empty (or, with densities, filled) start.
 
-    The same network, demand, models, seed and version of SUMO give the same run.
+    The same network, demand, models, stops, seed and version of SUMO give the same run. Each bus calls at one of the stops.
 
     Raises
     ------
@@ -120,7 +124,7 @@ def simulate(
     with tempfile.TemporaryDirectory(prefix="fullwell-traffic-") as name:
         folder = Path(name)
         (folder / "roads.net.xml").write_bytes(network.file.xml)
-        trips = sorted(_trips(network, demand, models, seed=seed, end_s=end_s, path=path))
+        trips = sorted(_trips(network, demand, models, stops, seed=seed, end_s=end_s, path=path))
         if len(trips) > _MOST_TRIPS:
             raise TrafficError(
                 f"{path}: the demand makes {len(trips)} trips; at most {_MOST_TRIPS} are run. Lower the rates, or the warm-up.",
@@ -129,7 +133,9 @@ def simulate(
         types = "".join(_type_element(model) for model in models)
         (folder / "demand.rou.xml").write_text(f"<routes>{types}{''.join(text for *_, text in trips)}</routes>")
         (folder / "signals.add.xml").write_text(_SIGNAL_OUTPUT)
-        arguments = ["--net-file", "roads.net.xml", "--route-files", "demand.rou.xml", "--additional-files", "signals.add.xml"]
+        (folder / "stops.add.xml").write_text(f"<additional>{stop_elements(stops)}</additional>")
+        arguments = ["--net-file", "roads.net.xml", "--route-files", "demand.rou.xml"]
+        arguments += ["--additional-files", "stops.add.xml,signals.add.xml"]
         arguments += _flat({**_DRIVING, **_OUTPUTS, **_QUIET})
         arguments += ["--seed", f"{seed % 2**31}", "--end", f"{end_s:g}"]
         arguments += ["--device.fcd.begin", f"{max(0.0, min(times_s) - 2 * _STEP_S):g}"]
@@ -278,7 +284,14 @@ def _type_element(model: VehicleModel) -> str:
 
 
 def _trips(
-    network: RoadNetwork, demand: TrafficDemand, models: Sequence[VehicleModel], *, seed: int, end_s: float, path: str
+    network: RoadNetwork,
+    demand: TrafficDemand,
+    models: Sequence[VehicleModel],
+    stops: Sequence[BusStop],
+    *,
+    seed: int,
+    end_s: float,
+    path: str,
 ) -> Iterator[tuple[float, str, str]]:
     """Yield (departure [s], id, element); a stream of its own for each kind, so that one kind's demand moves no other."""
     for kind in TRAFFIC_KINDS:
@@ -296,7 +309,7 @@ def _trips(
             )
         chosen = [model for model in models if model.kind == kind and model.weight > 0]
         weights = np.array([model.weight for model in chosen]) / sum(model.weight for model in chosen)
-        choice = _EndChoice(network, edges, kind)
+        choice = _EndChoice(network, edges, kind, stops if kind == "bus" else ())
         lanes_km = sum(lane.length_m for lane in edges.values()) / 1000.0
         rate += entry_rate * choice.ways_in
         density += 1000.0 * entry_rate / _usual_speed_m_s(kind, list(edges.values()))
@@ -350,10 +363,10 @@ def _usable_edges(network: RoadNetwork, kind: TrafficKind) -> dict[str, Lane]:
 class _EndChoice:
     """Where trips of a kind begin and end: from the network's border to its border, where there is one."""
 
-    def __init__(self, network: RoadNetwork, edges: Mapping[str, Lane], kind: TrafficKind) -> None:
+    def __init__(self, network: RoadNetwork, edges: Mapping[str, Lane], kind: TrafficKind, stops: Sequence[BusStop]) -> None:
         self.edges = edges
         self._network, self._walks = network, kind == "pedestrian"
-        self._vclass = _VCLASSES[kind]
+        self._vclass, self._stops = _VCLASSES[kind], stops
         self._names = list(edges)
         border = [junction.centre_m[:2] for junction in network.junctions if junction.kind == "dead_end"]
         places = np.array(border).reshape(-1, 2)
@@ -366,6 +379,7 @@ class _EndChoice:
         self.ways_in = len(border_starts) or -(-len(self._names) // 10)
         self._ends = frozenset(name for name, lane in edges.items() if near(lane.centre_m[-1]))
         self._goals: dict[str, list[str]] = {}
+        self._beyond: dict[str, frozenset[str]] = {}
 
     def pair(self, rng: np.random.Generator, *, spread: bool) -> tuple[str, str]:
         """Return the first and last edge of a trip; one that is `spread` begins anywhere."""
@@ -379,8 +393,16 @@ class _EndChoice:
         goals = self._goals[start]
         return start, goals[int(rng.integers(len(goals)))]
 
+    def stop(self, rng: np.random.Generator, start: str, goal: str, *, spread: bool) -> BusStop | None:
+        """Return a stop on the way from edge to edge; one that begins anywhere may have passed those of its first edge."""
+        there = self._reachable(start) - ({start} if spread else set())
+        fitting = [stop for stop in self._stops if stop.edge_id in there and goal in self._reachable(stop.edge_id)]
+        return fitting[int(rng.integers(len(fitting)))] if fitting else None
+
     def _reachable(self, edge: str) -> frozenset[str]:
-        return self._network.reachable(edge, vclass=self._vclass)
+        if edge not in self._beyond:
+            self._beyond[edge] = self._network.reachable(edge, vclass=self._vclass)
+        return self._beyond[edge]
 
 
 def _trip(
@@ -394,4 +416,7 @@ def _trip(
         return f'<person id={quoted} type={kind} depart="{depart_s:.2f}" departPos="{place}">{walk}</person>'
     place = "random_free" if spread else "base"
     how = f'departPos="{place}" departSpeed="{"0" if spread else "max"}" departLane="best"'
-    return f'<trip id={quoted} type={kind} depart="{depart_s:.2f}" from={quoteattr(start)} to={quoteattr(goal)} {how}/>'
+    stop = choice.stop(rng, start, goal, spread=spread)
+    halt = "" if stop is None else f'<stop busStop={quoteattr(stop.id)} duration="{rng.uniform(*_HALT_S):.1f}"/>'
+    ends = f"from={quoteattr(start)} to={quoteattr(goal)}"
+    return f'<trip id={quoted} type={kind} depart="{depart_s:.2f}" {ends} {how}>{halt}</trip>'

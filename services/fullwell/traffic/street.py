@@ -24,6 +24,7 @@ from fullwell.traffic.placement import AssetShelf, Footprints, PlacedAsset, foot
 from fullwell.traffic.ribbons import cut
 from fullwell.traffic.roads import Lane, RoadNetwork, read_network
 from fullwell.traffic.simulation import TrafficDemand, TrafficRun, VehicleModel, drive, idle_signals, simulate
+from fullwell.traffic.stops import BusStop, bus_stops, with_shelters
 from fullwell.traffic.sumo import TrafficError
 from fullwell.traffic.surfaces import KERB_HEIGHT_M, GroundPlan, RoadSurface, ground_plan, road_surfaces
 from fullwell.traffic.trajectories import Mover, TrafficFrame, TrafficKind, read_fcd, read_signal_states
@@ -128,8 +129,16 @@ class Street:
         """Everything that does not move, signals dark."""
         if not self.spec.dressed:
             return ()
-        night = self.spec.lamps == "night"
-        return dress(self.network, self.plan, self._style, self._shelf, seed=self.spec.seed, lights_on=night)
+        night, seed = self.spec.lamps == "night", self.spec.seed
+        dressed = dress(self.network, self.plan, self._style, self._shelf, seed=seed, lights_on=night)
+        if "bus_stop" not in self._style.furniture:
+            return dressed
+        return with_shelters(dressed, self._stops, self.network, self._shelf, seed=seed, lights_on=night)
+
+    @cached_property
+    def _stops(self) -> tuple[BusStop, ...]:
+        """Where buses stop; a user's own run has its own stops, of which the fcd-output does not tell."""
+        return bus_stops(self.network, seed=self.spec.seed) if self.spec.run is None else ()
 
     @cached_property
     def run(self) -> TrafficRun:
@@ -144,7 +153,10 @@ class Street:
             else:
                 states = idle_signals(self.network, spec.times_s)
             return TrafficRun(tuple(replace(frame, signals=states[frame.time_s]) for frame in frames), ())
-        return simulate(self.network, spec.demand, self._models(), seed=spec.seed, times_s=spec.times_s, path=self._path)
+        models = self._models()
+        return simulate(
+            self.network, spec.demand, models, seed=spec.seed, times_s=spec.times_s, stops=self._stops, path=self._path
+        )
 
     def _models(self) -> list[VehicleModel]:
         models = []
