@@ -17,7 +17,7 @@ from fullwell.schema.errors import RecipeError
 from fullwell.schema.loading import document_of
 from fullwell.schema.paths import with_values
 from fullwell.schema.v1.recipe import LabelsDocument, QualityDocument, RecipeDocument
-from fullwell.schema.variation import extreme_values, frame_values
+from fullwell.schema.variation import TIME_PATH, clip_times, extreme_values, frame_values
 
 if TYPE_CHECKING:
     import numpy as np
@@ -71,6 +71,10 @@ def validate(
 def frame_document(document: RecipeDocument, index: int) -> RecipeDocument:
     """Return the recipe of one frame, with `vary` applied and removed."""
     return varied_document(document, frame_values(document, index))
+
+
+_LONGEST_RUN_S = 300.0
+"""Moments farther apart than this have runs of their own."""
 
 
 def varied_document(document: RecipeDocument, values: dict[str, Any]) -> RecipeDocument:
@@ -143,6 +147,7 @@ class RecipeBuilder:
         if recipe.scene.traffic is not None:
             from fullwell.schema.conversion.traffic import street_view  # noqa: PLC0415
 
+            context.moments_s = _moments(self._document)
             context.street = street_view(recipe.scene.traffic, context)
         cameras = tuple(
             camera_rig(camera, f"cameras[{i}]", recipe.quality.oversampling, context) for i, camera in enumerate(recipe.cameras)
@@ -235,6 +240,16 @@ class RecipeBuilder:
             looks = [[film, [[s.model, s.exposure] for s in view.sensors]] for film, view in views]
             found.setdefault(digest_of([looks, weights]), views)
         return list(found.values())
+
+
+def _moments(document: RecipeDocument) -> tuple[float, ...]:
+    """Return the times [s] at which the recipe's frames look at its street, where one run of SUMO may serve them all."""
+    vary, traffic = document.vary, document.scene.traffic
+    if vary is None or traffic is None:
+        return ()
+    starts = [start for start in vary.grid.get(TIME_PATH, [traffic.time_s]) if isinstance(start, int | float)]
+    times = sorted({time for start in starts for time in clip_times(vary, start)})
+    return tuple(times) if times and times[-1] - times[0] <= _LONGEST_RUN_S else ()
 
 
 def _driving(recipe: RecipeDocument, street: StreetView | None, cameras: tuple[CameraRig, ...]) -> DrivingFacts | None:

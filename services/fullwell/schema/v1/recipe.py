@@ -284,6 +284,8 @@ class RecipeDocument(Document):
         if "driving.json" in self.outputs and self.scene.traffic is None:
             sentence = "asks for driving.json, which tells of a street; add scene.traffic, or ask for labels.json instead."
             refuse(sentence, "outputs", value="driving.json")
+        if self.vary is not None and self.vary.clip is not None and self.scene.traffic is None:
+            refuse("lets traffic go on; add scene.traffic, or use repeat for more frames of the same.", "vary", "clip")
         return self
 
     @model_validator(mode="after")
