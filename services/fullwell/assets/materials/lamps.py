@@ -47,6 +47,7 @@ _LAMPS: Final[dict[str, _Lit]] = {
     "street_led": _Lit(3.5e4, (2.5e4, 5e4), "LED-B3", "streetlights", "reflector", _STREET),
     "street_hps": _Lit(2e4, (1e4, 3e4), "HP1", "streetlights", "opal", _STREET),
     "street_mh": _Lit(3e4, (2e4, 4e4), "HP4", "streetlights", "opal", _STREET),
+    "street_mercury": _Lit(1.2e4, (6e3, 2e4), "mercury", "streetlights", "opal", _STREET),
     "traffic_red": _Lit(1e4, _SIGNAL_RANGE, "led:630:8", "other", "dark_red", _SIGNAL),
     "traffic_amber": _Lit(1e4, _SIGNAL_RANGE, "led:592:7", "other", "dark_amber", _SIGNAL),
     "traffic_green": _Lit(1e4, _SIGNAL_RANGE, "led:503:13", "other", "dark_green", _SIGNAL),
@@ -98,12 +99,34 @@ def _lamp(name: str, lit: _Lit) -> SpectralMaterial:
 @cache
 def _relative_power(light: str) -> Spectrum:
     """Return relative spectral power over 380 to 1000 nm, 0 outside."""
+    if light == "mercury":
+        return _mercury()
     if light.startswith("led:"):
         return _coloured_led(*(float(figure) for figure in light.split(":")[1:]))
     known = illuminant(light)
     if known.wavelength_nm[-1] >= DOMAIN_NM[1]:
         return known
     return _continued(light, known)
+
+
+_MERCURY_LINES: Final = {404.7: 0.45, 407.8: 0.04, 435.8: 0.85, 546.1: 1.0, 577.0: 0.47, 579.1: 0.48}
+_VANADATE_LINES: Final = {594.0: 0.06, 615.5: 0.26, 619.4: 0.46, 650.0: 0.05, 699.0: 0.11, 704.5: 0.11}
+"""Powers over that of the green line: of the discharge, and of a coating of yttrium vanadate with europium that turns its
+ultraviolet to red. Representative: the coating is chosen to give the 4 000 K of lamps for streets."""
+
+_MERCURY_WIDTH_NM: Final = 1.2
+_MERCURY_CONTINUUM: Final = 1.2e-3
+"""Per nanometre, over the green line's power."""
+
+
+def _mercury() -> Spectrum:
+    wavelength_nm = np.arange(DOMAIN_NM[0], DOMAIN_NM[1] + 0.25, 0.5)
+    values = np.full(wavelength_nm.shape, _MERCURY_CONTINUUM)
+    for centre_nm, power in (_MERCURY_LINES | _VANADATE_LINES).items():
+        off = (wavelength_nm - centre_nm) / _MERCURY_WIDTH_NM
+        values += power * np.exp(-0.5 * off**2) / (_MERCURY_WIDTH_NM * np.sqrt(2.0 * np.pi))
+    source = "high-pressure mercury lamp with a vanadate coating, from its lines; representative powers"
+    return Spectrum(wavelength_nm, 100.0 * values, outside="zero", unit="relative", source=source)
 
 
 def _coloured_led(peak_nm: float, deviation_nm: float) -> Spectrum:

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from fullwell.core.errors import FieldError, unknown_name_message
 from fullwell.core.hashing import digest_of
-from fullwell.radiometry import scale_to_luminance
-from fullwell.scene import Emission, Light, Material, Mesh, Part, SceneObject, SpotLight, look_at
+from fullwell.scene import Emission, Light, Material, Mesh, Part, SceneObject, look_at
 from fullwell.schema.assets import candidates_of, traffic_queries
-from fullwell.schema.conversion.assets import DrawnAsset, asset_part_material, catalogue_material, lamp_of
+from fullwell.schema.conversion.assets import DrawnAsset, asset_part_material, catalogue_material
 from fullwell.schema.conversion.context import Context, fail, located
+from fullwell.schema.conversion.street_lamps import bright_as_its_kind, headlamp_beams, lamp_material
 from fullwell.schema.v1.cameras import MountDocument
 from fullwell.schema.v1.traffic import DemandDocument, EgoDocument, RoadNetworkDocument, TargetDocument, TrafficDocument
 
@@ -377,16 +377,17 @@ def street_objects(
             drawn[item.asset.digest, level] = _drawn(item, level, context)
         asset = drawn[item.asset.digest, level]
         hidden = tuple(document.ego.hide) if document.ego is not None and item is view.ego else ()
-        key = (item.asset.digest, level, item.lit, item.paint, hidden)
+        lamps = tuple(lamp_material(part.material.name, item, document, context.seed) for part in item.asset.parts)
+        key = (item.asset.digest, level, item.lit, item.paint, hidden, lamps)
         if key not in parts:
-            parts[key] = tuple(part for part in _parts(asset, item, context) if not _matches(part.name, hidden))
+            parts[key] = tuple(part for part in _parts(asset, item, document, context) if not _matches(part.name, hidden))
         if not parts[key]:
             fail("scene.traffic.ego.hide", "leaves nothing of the ego; leave out a pattern, or set show: false.")
         objects.append(SceneObject(item.id, item.asset.asset_class, parts[key], item.to_world(), (asset.licence,)))
-        lights += _beams(document, item, asset, context)
+        lights += headlamp_beams(document, item, asset, context.seed)
     if view.ego is not None and not document.ego_is_shown:
         level = len(view.ego.asset.levels) - 1  # it is not seen; only where its lamps are
-        lights += _beams(document, view.ego, _drawn(view.ego, level, context), context)
+        lights += headlamp_beams(document, view.ego, _drawn(view.ego, level, context), context.seed)
     for note in view.notes:
         context.warn(f"scene.traffic: {note}")
     if far:
@@ -396,37 +397,6 @@ def street_objects(
 
 def _matches(name: str, patterns: Sequence[str]) -> bool:
     return any(fnmatchcase(name, pattern) for pattern in patterns)
-
-
-def _beams(document: TrafficDocument, item: PlacedAsset, asset: DrawnAsset, context: Context) -> Iterator[SpotLight]:
-    """Yield the cones of a vehicle's headlamps, from just before the middle of each."""
-    from fullwell.traffic.headlamps import BEAMS, beam_direction  # noqa: PLC0415
-
-    if "headlight*" not in item.lit:
-        return
-    to_world = item.to_world()
-    for part in asset.model.parts:
-        material = asset.record(part, "scene.traffic").material.name
-        if not part.name.startswith("headlight") or not material.startswith("lamp/headlight"):
-            continue
-        low, high = part.vertices_m.min(axis=0), part.vertices_m.max(axis=0)
-        place = (to_world @ np.array([high[0] + _BEFORE_LENS_M, *((low + high) / 2)[1:], 1.0]))[:3]
-        spd = lamp_of(material)
-        for beam in BEAMS[document.headlamps]:
-            direction = beam_direction(to_world[:3, 0], to_world[:3, 2], beam.down_deg)
-            # Luminous intensity is to radiant intensity what luminance is to radiance.
-            intensity = scale_to_luminance(spd, beam.intensity_cd)
-            yield SpotLight(
-                _three(place), _three(direction), intensity, beam.beam_deg, beam.cutoff_deg, "headlights", carrier=item.id
-            )
-
-
-_BEFORE_LENS_M: Final = 0.05
-
-
-def _three(vector: Array) -> tuple[float, float, float]:
-    x, y, z = vector.tolist()
-    return x, y, z
 
 
 def _level(item: PlacedAsset, distances_m: Sequence[float], viewpoints: Sequence[Viewpoint]) -> int:
@@ -444,13 +414,18 @@ def _drawn(item: PlacedAsset, level: int, context: Context) -> DrawnAsset:
         return DrawnAsset(item.asset, context.files.level(file, item.asset.levels[level].sha256, path="scene.traffic"))
 
 
-def _parts(asset: DrawnAsset, item: PlacedAsset, context: Context) -> Iterator[Part]:
+def _parts(asset: DrawnAsset, item: PlacedAsset, document: TrafficDocument, context: Context) -> Iterator[Part]:
     paintable = {part.name for part in asset.manifest.parts if part.paintable}
     for loaded in asset.model.parts:
         material: Material
         emission: Emission | None
+        name = asset.record(loaded, "scene.traffic").material.name
+        lamp = lamp_material(name, item, document, context.seed) if name.startswith("lamp/") else ""
         if item.paint and loaded.name in paintable:
             material, emission = catalogue_material(item.paint, "scene.traffic", context)
+        elif lamp:
+            material, emission = catalogue_material(lamp, "scene.traffic", context, lit=_matches(loaded.name, item.lit))
+            emission = None if emission is None else bright_as_its_kind(emission, lamp, loaded, item)
         else:
             material, emission = asset_part_material(asset, loaded, item.lit, f"scene.traffic ({item.asset.id})", context)
         yield Part(Mesh(loaded.vertices_m, loaded.faces, loaded.normals, loaded.uv), material, np.eye(4), emission, loaded.name)

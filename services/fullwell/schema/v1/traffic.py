@@ -139,7 +139,8 @@ class TargetDocument(Document):
 class TrafficDocument(Document):
     """A street with traffic by SUMO. `demand`, or a `run`; taken at `time_s` after the start.
 
-    `style` says how the street is dressed; `lamps` what is lit. Assets are the approved ones of the store unless `state` says
+    `style` says how the street is dressed; `lamps` what is lit; `street_lamps` what is in street lights, each asset's own lamps
+    unless it says otherwise. Assets are the approved ones of the store unless `state` says
     otherwise, with one of `licence` where it is given.
     """
 
@@ -151,6 +152,10 @@ class TrafficDocument(Document):
     dressed: Flag = True
     lamps: Literal["day", "night"] = "day"
     headlamps: Literal["low", "high"] = "low"
+    street_lamps: Literal["asset", "led", "sodium", "mercury", "metal_halide"] = "asset"
+    drives_on: Literal["right", "left"] = "right"
+    """For which side of the road headlamps are made: their cut-off rises on it."""
+
     wet: Flag = False
     ego: EgoDocument | None = None
     targets: list[TargetDocument] = Field(default_factory=list, max_length=100)
