@@ -14,13 +14,13 @@ from fullwell.sensor import SensorModel, dark_noise_e, reference_model
 from fullwell.sensor.exposure import saturation_electrons
 from fullwell.sensor.exposures import BracketExposure, BurstExposure, ChannelExposure
 
-__all__ = ["SensorNoise", "electrons_per_light"]
+__all__ = ["SensorNoise", "electrons_per_light", "longest_capture"]
 
 _CLIPPED = 1.2
-"""Times the saturation signal: light that far above it leaves no trace of its own error."""
+"""Times the saturation signal: an error that does not bring the light below that leaves no trace."""
 
 _CLIPPED_ERROR = 0.1
-"""Relative error allowed there: it still may spread to neighbours by diffraction and crosstalk."""
+"""Largest relative error allowed there: it still may spread to neighbours by diffraction and crosstalk."""
 
 
 def electrons_per_light(rig: CameraRig, sensor: SensorModel, exposure_time_s: float) -> NDArray[np.float64]:
@@ -38,7 +38,8 @@ class SensorNoise:
     """Noise variance of a camera's sensors as light: a `fullwell.render.NoiseTarget`.
 
     Shot noise, dark current's shot noise and the readout's noise, of the capture that collects most. Where a pixel is
-    saturated anyway, only a tenth of its light is asked for. Fixed patterns are no noise: they do not hide an error.
+    saturated anyway, its light may err by what is beyond 1.2 times saturation, and by a tenth at most. Fixed patterns are no
+    noise: they do not hide an error.
     """
 
     def __init__(
@@ -67,14 +68,14 @@ class SensorNoise:
         sums = [light[..., list(part), :, :].sum(axis=-3) for _, parts in self._sensors for part in parts]
         return np.stack(sums, axis=-3)
 
-    def __call__(self, channels: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return (channels, rows, cols) noise variances of film samples, as light."""
+    def __call__(self, channels: NDArray[np.float64], sure: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """Return (channels, rows, cols) noise variances of film samples, as light; `sure` light tells what is saturated."""
         allowed = np.empty(channels.shape)
         for number, (sensor, span) in enumerate(self._spans()):
             light = channels[span]
             if number not in self.times_s:
                 self.times_s[number] = self._find_time(sensor, light)
-            allowed[span] = self._variance(sensor, self.times_s[number], light)
+            allowed[span] = self._variance(sensor, self.times_s[number], light, light if sure is None else sure[span])
         return allowed
 
     def saturation(self, light: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -93,8 +94,10 @@ class SensorNoise:
             yield sensor, slice(start, start + len(parts))
             start += len(parts)
 
-    def _variance(self, sensor: SensorRig, base_time_s: float, light: NDArray[np.float64]) -> NDArray[np.float64]:
-        ratio, captures = _longest(sensor)
+    def _variance(
+        self, sensor: SensorRig, base_time_s: float, light: NDArray[np.float64], sure: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        ratio, captures = longest_capture(sensor)
         time_s = base_time_s * ratio
         model = reference_model(sensor.model)
         factor = electrons_per_light(self._rig, sensor.model, time_s)
@@ -103,12 +106,13 @@ class SensorNoise:
         samples_per_pixel = (sensor.model.pixel_pitch_m / self._rig.camera.film.pitch_m) ** 2
         variance = noise_e2 / factor**2 * (samples_per_pixel / captures)
         if ratio == 1.0 and captures == 1 and not sensor.model.photodiodes:
-            clipped = mean_e > _CLIPPED * saturation_electrons(model)
-            variance = np.where(clipped, np.maximum(variance, (_CLIPPED_ERROR * light) ** 2), variance)
+            # Continuous where saturation begins: what is full by a hair in one estimate is not in the next.
+            beyond = np.maximum(sure - _CLIPPED * saturation_electrons(model) / factor, 0.0)
+            variance = np.maximum(variance, np.minimum(beyond, _CLIPPED_ERROR * sure) ** 2)
         return np.asarray(variance)
 
 
-def _longest(sensor: SensorRig) -> tuple[float, int]:
+def longest_capture(sensor: SensorRig) -> tuple[float, int]:
     """Return (time of the longest capture over the base time, captures that are averaged)."""
     match sensor.exposure:
         case BracketExposure(ratios=ratios):

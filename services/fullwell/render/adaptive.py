@@ -29,7 +29,7 @@ _SAFETY = 1.05
 _AROUND = 5
 """Side of a tile's surroundings, in tiles."""
 
-_PRIOR_SAMPLES = 64
+_PRIOR_SAMPLES = 128
 """Samples per pixel at which a tile's own variance counts as much as that of its surroundings."""
 
 
@@ -45,8 +45,12 @@ class NoiseTarget(Protocol):
         """Return (..., channels, rows, cols): what the sensors' channels count of (..., responses, rows, cols) of light."""
         ...
 
-    def __call__(self, channels: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the noise variance of the sensors, expressed as light, for (channels, rows, cols) of light so far."""
+    def __call__(self, channels: NDArray[np.float64], sure: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """Return the noise variance of the sensors, expressed as light, for (channels, rows, cols) of light so far.
+
+        `sure` is the light that is surely there, of the same shape, by which saturation is told: no single sample makes it.
+        Without it that is `channels`.
+        """
         ...
 
     def saturation(self, light: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -149,7 +153,7 @@ def tile_errors(replicas: NDArray[np.floating], views: Views) -> TileErrors:
         (replicas, groups, responses, rows, cols): independent estimates of the light.
     """
     worst: NDArray[np.float64] | None = None
-    seen: dict[Hashable, tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
+    seen: dict[Hashable, tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]] = {}
     for weights, target in views:
         key = (weights.tobytes(), target.key)
         if key not in seen:  # views that differ in exposure only look at the same means and errors
@@ -161,17 +165,26 @@ def tile_errors(replicas: NDArray[np.floating], views: Views) -> TileErrors:
     return TileErrors(np.sqrt(worst), float(np.sqrt(worst.mean())))
 
 
-def _means_and_errors(light: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return (channels, rows, cols) means of (replicas, ...) of light, and their variances summed over tiles."""
+def _means_and_errors(
+    light: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return (channels, rows, cols) means of (replicas, ...) of light, what is sure of it, and the means' variances over tiles.
+
+    Sure is what all replicas but one have: one bright sample makes its own replica bright, and the mean, but not that. A
+    pixel whose mean such a sample lifts over the full well is no saturated one.
+    """
     count = len(light)
     mean = light.mean(axis=0)
-    return mean, _tile_sums(((light - mean) ** 2).sum(axis=0) / (count * (count - 1)))
+    sure = np.minimum(np.partition(light, 1, axis=0)[1], mean)
+    return mean, sure, _tile_sums(((light - mean) ** 2).sum(axis=0) / (count * (count - 1)))
 
 
-def _tile_squares(mean: NDArray[np.float64], error: NDArray[np.float64], target: NoiseTarget) -> NDArray[np.float64]:
+def _tile_squares(
+    mean: NDArray[np.float64], sure: NDArray[np.float64], error: NDArray[np.float64], target: NoiseTarget
+) -> NDArray[np.float64]:
     """Return (tile rows, tile cols) variance of the error over that of the noise, of the worst channel."""
     # Averages over a tile of the error and of the noise, not of their ratio: one pixel that happens to be dark is no outlier.
-    noise = _tile_sums(target(mean))
+    noise = _tile_sums(target(mean, sure))
     square = np.divide(error, noise, out=np.zeros_like(error), where=noise > 0)
     square[(noise <= 0) & (error > 0)] = np.inf
     return np.asarray(square.max(axis=0))
@@ -227,15 +240,20 @@ def _cautious(ratio: NDArray[np.float64], samples: NDArray[np.int64]) -> NDArray
     """Return the error over noise by which tiles are judged: their own, or with few samples that of their surroundings too.
 
     Where rare paths are bright, a tile that has met none yet looks exact. Variances for one sample, in units of the sensor's
-    noise, are averaged with those of the tiles around, half and half at `_PRIOR_SAMPLES`; from four
-    times that on a tile stands for itself, however bright its neighbour.
+    noise, are averaged with those of the tiles around, each by its number of samples, half and half at `_PRIOR_SAMPLES`; from
+    four times that on a tile stands for itself, however bright its neighbour.
     """
     for_one = np.where(np.isfinite(ratio), ratio, 0.0) ** 2 * samples
     # Running sums may fall below zero by rounding.
-    around = np.maximum(uniform_filter(for_one, size=_AROUND, mode="nearest"), 0.0)
+    around = np.maximum(_around(for_one * samples) / _around(np.maximum(samples, 1)), 0.0)
     own = np.where(samples < 4 * _PRIOR_SAMPLES, samples**2 / (samples**2 + _PRIOR_SAMPLES**2), 1.0)
     together = (own * for_one + (1.0 - own) * around) / np.maximum(samples, 1)
     return np.asarray(np.maximum(ratio, np.sqrt(together)))
+
+
+def _around(values: NDArray[np.generic]) -> NDArray[np.float64]:
+    """Return the mean over each tile's surroundings, itself included."""
+    return np.asarray(uniform_filter(values.astype(np.float64), size=_AROUND, mode="nearest"))
 
 
 def _more_samples(ratio: NDArray[np.float64], so_far: NDArray[np.int64], wanted: float, cap: int) -> NDArray[np.int64]:

@@ -45,7 +45,7 @@ class ShotNoise:
     def channels(self, light: NDArray[np.float64]) -> NDArray[np.float64]:
         return light
 
-    def __call__(self, channels: NDArray[np.float64]) -> NDArray[np.float64]:
+    def __call__(self, channels: NDArray[np.float64], sure: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         return 1e-4 * TYPICAL_LIGHT * (channels + 1e-3 * TYPICAL_LIGHT)
 
     def saturation(self, light: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -119,7 +119,7 @@ def test_one_film_sample_is_a_tile_of_its_own() -> None:
 
 def test_lamp_of_1e12_w_is_sampled_like_any_other_by_a_sensor_that_is_exposed_for_it() -> None:
     class Exposed(ShotNoise):
-        def __call__(self, channels: NDArray[np.float64]) -> NDArray[np.float64]:
+        def __call__(self, channels: NDArray[np.float64], sure: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
             return 1e-4 * channels.max() * (channels + 1e-3 * channels.max())
 
     goal = SamplingGoal(noise_ratio=0.5, max_samples_per_pixel=CAP)

@@ -159,6 +159,31 @@ def test_saturated_pixels_ask_for_a_tenth_of_their_light_only(recipe: dict[str, 
     np.testing.assert_allclose(noise_of(rig)(uniform(rig, above))[0], (0.1 * above) ** 2, rtol=EXACT)
 
 
+@pytest.mark.parametrize("beyond", [1.2, 1.2001, 1.25, 1.33, 1.34, 5.0])
+def test_allowance_of_saturated_pixels_grows_from_nothing(recipe: dict[str, Any], beyond: float) -> None:
+    """The light may err by what is beyond 1.2 times saturation: no estimate on the wrong side of a step is taken for exact."""
+    model = noisy_model()
+    rig = rig_of(recipe, model)
+    factor = electrons_per_light(rig, model, TIME_S)
+    full = saturation_electrons(model)
+    light = light_of(rig, beyond * full)
+    electrons = light * factor
+    shot = (electrons + DARK_E_PER_S * TIME_S + dark_noise_e(model) ** 2) / factor**2
+    allowed = np.minimum(np.maximum(electrons - 1.2 * full, 0.0), 0.1 * electrons) / factor
+    np.testing.assert_allclose(noise_of(rig)(uniform(rig, light))[0], np.maximum(shot, allowed**2), rtol=1e-9)
+
+
+def test_saturation_is_told_by_sure_light_and_shot_noise_by_all_of_it(recipe: dict[str, Any]) -> None:
+    model = noisy_model()
+    rig = rig_of(recipe, model)
+    factor = electrons_per_light(rig, model, TIME_S)
+    full = saturation_electrons(model)
+    light, sure = uniform(rig, light_of(rig, 50 * full)), uniform(rig, light_of(rig, 0.01 * full))
+    shot = (light[0] * factor + DARK_E_PER_S * TIME_S + dark_noise_e(model) ** 2) / factor**2
+    np.testing.assert_allclose(noise_of(rig)(light, sure)[0], shot, rtol=EXACT)
+    np.testing.assert_array_equal(noise_of(rig)(light, light), noise_of(rig)(light))
+
+
 def test_saturating_light_fills_the_well_on_the_axis(recipe: dict[str, Any]) -> None:
     model = noisy_model()
     rig = rig_of(recipe, model)

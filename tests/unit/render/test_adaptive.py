@@ -61,7 +61,7 @@ class EvenNoise:
     def channels(self, light: NDArray[np.float64]) -> NDArray[np.float64]:
         return light
 
-    def __call__(self, channels: NDArray[np.float64]) -> NDArray[np.float64]:
+    def __call__(self, channels: NDArray[np.float64], sure: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         return np.full(channels.shape, self._factor)
 
     def saturation(self, light: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -147,6 +147,50 @@ def test_tile_that_has_met_no_rare_path_is_not_believed_beside_one_that_has() ->
     assert 4 * LEAST_SAMPLES <= lucky < noisy / 2
 
 
+class FireflyImage(GaussianImage):
+    """One replica of the first pixel meets a path of `light` among its first samples, and never again."""
+
+    def __init__(self, deviation_by_tile: NDArray[np.float64], light: float) -> None:
+        super().__init__(deviation_by_tile)
+        self._sums[0, 0, 0, 0] = light
+
+
+class FullWell(EvenNoise):
+    """Unit noise, and an allowance of a tenth of the light from `FULL` on."""
+
+    FULL = 10 * LIGHT
+
+    def __call__(self, channels: NDArray[np.float64], sure: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        told = channels if sure is None else sure
+        return np.where(told > self.FULL, (0.1 * told) ** 2, 1.0)
+
+
+def test_one_bright_sample_does_not_make_a_dark_pixel_a_saturated_one() -> None:
+    """Its error is twice the light above the full well, not a few times the tenth that would do for a saturated pixel."""
+    firefly = 40_000.0 * LEAST_SAMPLES  # lifts the mean of the pixel to 40 times the full well
+    image = FireflyImage(np.ones((1, 1)), firefly)
+    outcome = run(image, SamplingGoal(noise_ratio=None, samples_per_pixel=LEAST_SAMPLES), FullWell())
+    assert image.replicas().mean(axis=0)[0, 0, 0, 0] > 40 * FullWell.FULL
+    # One of four replicas has it all, so the standard error is the mean itself; over the noise of 64 pixels.
+    assert outcome.ratio[0, 0] == pytest.approx(40_000.0 / 8, rel=0.01)
+
+
+def test_tile_with_a_firefly_is_sampled_until_the_firefly_does_not_matter() -> None:
+    image = FireflyImage(np.ones((1, 1)), 400_000.0)
+    outcome = run(image, SamplingGoal(noise_ratio=4.0, max_samples_per_pixel=1 << 20), FullWell())
+    assert outcome.unmet_tiles == 0
+    # Error 400 000 / samples in one of 64 pixels of unit noise.
+    assert 400_000.0 / (4.0 * 8) <= outcome.samples[0, 0] * 1.01 < 2 * 400_000.0 / (4.0 * 8)
+
+
+def test_pixel_that_every_replica_sees_saturated_is_a_saturated_one() -> None:
+    light = np.full((REPLICAS, 1, 1, TILE, TILE), 100 * FullWell.FULL)
+    light[0] *= 1.2
+    ratio = tile_errors(light, [(ONE_VIEW, FullWell())]).ratio[0, 0]
+    # Replicas at 1.2, 1, 1, 1: a standard error of 0.05, over an allowance of 0.1 times what all but one have.
+    assert ratio == pytest.approx(0.5, rel=1e-6)
+
+
 @pytest.mark.parametrize("cap", [4, 8, 16, 100])
 def test_cap_below_the_first_round_is_kept_too(cap: int) -> None:
     outcome = run(GaussianImage(np.full((1, 2), 50.0)), SamplingGoal(noise_ratio=0.5, max_samples_per_pixel=cap), EvenNoise())
@@ -182,7 +226,7 @@ def test_strictest_view_decides() -> None:
 
 def test_worst_channel_decides() -> None:
     class SecondChannelIsStrict(EvenNoise):
-        def __call__(self, channels: NDArray[np.float64]) -> NDArray[np.float64]:
+        def __call__(self, channels: NDArray[np.float64], sure: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
             return np.array([100.0, 0.25])[:, None, None] * np.ones(channels.shape)
 
     goal = SamplingGoal(noise_ratio=0.5, max_samples_per_pixel=1 << 20)
