@@ -208,8 +208,9 @@ def read_fcd(
                 break
         if here is not None and waiting and abs(waiting[0] - here.time_s) <= _SNAP_S:
             found[waiting[0]] = maker.at(before, here, None)
-    except (ParseError, ValueError, TypeError, OSError) as error:
-        raise TrafficError(f"{path} is no readable fcd-output of SUMO: {error}.", path) from error
+    except (ParseError, ValueError, OSError, KeyError) as error:
+        reason = f"something in it lacks {error}" if isinstance(error, KeyError) else str(error)
+        raise TrafficError(f"{path} is no readable fcd-output of SUMO: {reason}.", path) from error
     missing = [time for time in times_s if time not in found]
     if missing:
         span = f"it holds {first_s:g} to {last_s:g} s" if last_s >= first_s else "it holds no time step"
