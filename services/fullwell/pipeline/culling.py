@@ -304,7 +304,8 @@ def _light_of(scene: SceneDescription, grid: WavelengthGrid, reflectance: float)
 
 
 def _emissions(scene: SceneDescription) -> list[Spectrum]:
-    return [part.emission.radiance for item in scene.objects for part in item.parts if part.emission is not None]
+    found = (part.emission for item in scene.objects for part in item.parts if part.emission is not None)
+    return [e.radiance if e.pattern is None else e.radiance.scaled(float(e.pattern.shares.max())) for e in found]
 
 
 def _far_light(light: Light, grid: WavelengthGrid) -> _FarLight:

@@ -295,6 +295,8 @@ def _shape(mi: Any, materials: _Materials, shape_id: str, part: Part, to_world: 
     bsdf = materials.get(part.material)
     emission = None
     if part.emission is not None and np.any(part.emission.radiance.values > _BLACK):
+        if part.emission.pattern is not None:
+            raise _no_patterns()
         emission = {"type": "area", "radiance": _spectrum(part.emission.radiance)}
     native = _native_shape(mi, part, to_world)
     if native is None:
@@ -430,10 +432,7 @@ def _emitter(mi: Any, light: Light, recentre: NDArray[np.float64]) -> dict[str, 
                 "beam_width": float(light.beam_deg),
             }
         case GoniometricLight():
-            raise FieldError(
-                "lamps with a beam pattern, as headlamps are, need the compiled renderer; leave them out or install libLLVM.",
-                path="scene.lights",
-            )
+            raise _no_patterns()
         case DirectionalLight():
             return {
                 "type": "directional",
@@ -454,6 +453,14 @@ def _emitter(mi: Any, light: Light, recentre: NDArray[np.float64]) -> dict[str, 
                 "sun_scale": float(light.sun_weight),
                 "sky_scale": float(light.sky_weight),
             }
+
+
+def _no_patterns() -> FieldError:
+    return FieldError(
+        "lamps with a beam pattern, as headlamps and street lights have, need the compiled renderer; leave them out "
+        "(lamps: day) or install libLLVM.",
+        path="scene.lights",
+    )
 
 
 def _frame_along(position_m: NDArray[np.float64], direction: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -163,11 +163,80 @@ Material: TypeAlias = Diffuse | RoughPlastic | Principled | Conductor | Dielectr
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class BeamPattern:
+    """How a lamp spreads its light: shares of its intensity over directions, bilinear between even steps, 0 outside.
+
+    Attributes
+    ----------
+    shares
+        (rows, cols), >= 0 and at least 2 each; rows go up in elevation, columns in azimuth.
+    azimuth_deg
+        (first, last) column, about the lamp's up, 0 forward and positive to its left, within [-180, 180].
+    elevation_deg
+        (first, last) row, from the plane of forward and left towards up, within [-90, 90].
+    """
+
+    shares: NDArray[np.float32]
+    azimuth_deg: tuple[float, float]
+    elevation_deg: tuple[float, float]
+
+    def azimuths_rad(self) -> NDArray[np.float64]:
+        """Return (cols,) azimuths [rad]."""
+        return np.radians(np.linspace(*self.azimuth_deg, self.shares.shape[1]))
+
+    def elevations_rad(self) -> NDArray[np.float64]:
+        """Return (rows,) elevations [rad]."""
+        return np.radians(np.linspace(*self.elevation_deg, self.shares.shape[0]))
+
+    def steps_rad(self) -> tuple[float, float]:
+        """Return the steps of azimuth and elevation [rad]."""
+        rows, cols = self.shares.shape
+        (left, right), (low, high) = np.radians(self.azimuth_deg), np.radians(self.elevation_deg)
+        return float(right - left) / (cols - 1), float(high - low) / (rows - 1)
+
+    def directions(self) -> NDArray[np.float64]:
+        """Return (rows, cols, 3) unit vectors in (forward, left, up)."""
+        elevation, azimuth = np.meshgrid(self.elevations_rad(), self.azimuths_rad(), indexing="ij")
+        flat = np.cos(elevation)
+        return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)], axis=-1)
+
+    def share(self, azimuth_deg: ArrayLike, elevation_deg: ArrayLike) -> NDArray[np.float64]:
+        """Return the shares in directions, as the renderer mixes them."""
+        rows, cols = self.shares.shape
+        col, row = (
+            (np.asarray(angle, dtype=np.float64) - first) / (last - first) * (count - 1)
+            for angle, (first, last), count in (
+                (azimuth_deg, self.azimuth_deg, cols),
+                (elevation_deg, self.elevation_deg, rows),
+            )
+        )
+        inside = (col >= 0) & (col <= cols - 1) & (row >= 0) & (row <= rows - 1)
+        side = np.clip(np.floor(col), 0, cols - 2).astype(np.int64)
+        top = np.clip(np.floor(row), 0, rows - 2).astype(np.int64)
+        across, down = np.clip(col - side, 0, 1), np.clip(row - top, 0, 1)
+        table = np.asarray(self.shares, dtype=np.float64)
+        low = table[top, side] * (1 - across) + table[top, side + 1] * across
+        high = table[top + 1, side] * (1 - across) + table[top + 1, side + 1] * across
+        return np.where(inside, low * (1 - down) + high * down, 0.0)
+
+    def solid_angle_sr(self) -> float:
+        """Return flux over the intensity of a share of 1 [sr]: midpoints of the table's cells."""
+        table = np.asarray(self.shares, dtype=np.float64)
+        middle = (table[1:, 1:] + table[:-1, 1:] + table[1:, :-1] + table[:-1, :-1]) / 4
+        sine = np.sin(self.elevations_rad())
+        return float((middle * np.diff(sine)[:, None]).sum() * self.steps_rad()[0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Emission:
-    """Surface emission: radiance [W sr^-1 m^-2 nm^-1] on the side of the normal, in a named light group."""
+    """Surface emission: radiance [W sr^-1 m^-2 nm^-1] on the side of the normal, in a named light group.
+
+    With a `pattern` the radiance is that where its share is 1, by direction in the part's own axes: x forward, y left, z up.
+    """
 
     radiance: Spectrum
     group: str = "default"
+    pattern: BeamPattern | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -233,71 +302,6 @@ class SpotLight:
     cutoff_deg: float
     group: str = "default"
     carrier: str = ""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class BeamPattern:
-    """How a lamp spreads its light: shares of its intensity over directions, bilinear between even steps, 0 outside.
-
-    Attributes
-    ----------
-    shares
-        (rows, cols), >= 0 and at least 2 each; rows go up in elevation, columns in azimuth.
-    azimuth_deg
-        (first, last) column, about the lamp's up, 0 forward and positive to its left, within [-180, 180].
-    elevation_deg
-        (first, last) row, from the plane of forward and left towards up, within [-90, 90].
-    """
-
-    shares: NDArray[np.float32]
-    azimuth_deg: tuple[float, float]
-    elevation_deg: tuple[float, float]
-
-    def azimuths_rad(self) -> NDArray[np.float64]:
-        """Return (cols,) azimuths [rad]."""
-        return np.radians(np.linspace(*self.azimuth_deg, self.shares.shape[1]))
-
-    def elevations_rad(self) -> NDArray[np.float64]:
-        """Return (rows,) elevations [rad]."""
-        return np.radians(np.linspace(*self.elevation_deg, self.shares.shape[0]))
-
-    def steps_rad(self) -> tuple[float, float]:
-        """Return the steps of azimuth and elevation [rad]."""
-        rows, cols = self.shares.shape
-        (left, right), (low, high) = np.radians(self.azimuth_deg), np.radians(self.elevation_deg)
-        return float(right - left) / (cols - 1), float(high - low) / (rows - 1)
-
-    def directions(self) -> NDArray[np.float64]:
-        """Return (rows, cols, 3) unit vectors in (forward, left, up)."""
-        elevation, azimuth = np.meshgrid(self.elevations_rad(), self.azimuths_rad(), indexing="ij")
-        flat = np.cos(elevation)
-        return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)], axis=-1)
-
-    def share(self, azimuth_deg: ArrayLike, elevation_deg: ArrayLike) -> NDArray[np.float64]:
-        """Return the shares in directions, as the renderer mixes them."""
-        rows, cols = self.shares.shape
-        col, row = (
-            (np.asarray(angle, dtype=np.float64) - first) / (last - first) * (count - 1)
-            for angle, (first, last), count in (
-                (azimuth_deg, self.azimuth_deg, cols),
-                (elevation_deg, self.elevation_deg, rows),
-            )
-        )
-        inside = (col >= 0) & (col <= cols - 1) & (row >= 0) & (row <= rows - 1)
-        side = np.clip(np.floor(col), 0, cols - 2).astype(np.int64)
-        top = np.clip(np.floor(row), 0, rows - 2).astype(np.int64)
-        across, down = np.clip(col - side, 0, 1), np.clip(row - top, 0, 1)
-        table = np.asarray(self.shares, dtype=np.float64)
-        low = table[top, side] * (1 - across) + table[top, side + 1] * across
-        high = table[top + 1, side] * (1 - across) + table[top + 1, side + 1] * across
-        return np.where(inside, low * (1 - down) + high * down, 0.0)
-
-    def solid_angle_sr(self) -> float:
-        """Return flux over the intensity of a share of 1 [sr]: midpoints of the table's cells."""
-        table = np.asarray(self.shares, dtype=np.float64)
-        middle = (table[1:, 1:] + table[:-1, 1:] + table[1:, :-1] + table[:-1, :-1]) / 4
-        sine = np.sin(self.elevations_rad())
-        return float((middle * np.diff(sine)[:, None]).sum() * self.steps_rad()[0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

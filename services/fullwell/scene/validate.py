@@ -16,6 +16,7 @@ from fullwell.core.errors import FieldError
 from fullwell.radiometry.spectrum import Spectrum
 from fullwell.scene.camera import Camera
 from fullwell.scene.description import (
+    BeamPattern,
     Conductor,
     ConstantEnvironment,
     Cube,
@@ -196,6 +197,10 @@ def _part(part: Part, to_world: NDArray[np.float64], where: _Place, seen: set[in
         seen.add(id(part.material))
     if part.emission is not None:
         _power(part.emission.radiance, where, "emission.radiance")
+        if part.emission.pattern is not None:
+            _pattern(part.emission.pattern, where)
+            largest = max(1.0, float(part.emission.pattern.shares.max()))
+            _power(part.emission.radiance.scaled(largest), where, "emission.radiance (times the largest share)")
         if isinstance(part.geometry, Mesh) and may_repeat_faces(part.geometry):
             _one_sided(part.geometry, where)
 
@@ -397,7 +402,11 @@ def _goniometric(light: GoniometricLight, where: _Place) -> None:
     up = _direction(light.up, where, "up")
     if np.linalg.norm(np.cross(up / np.linalg.norm(up), forward / np.linalg.norm(forward))) < _LEAST_SINE_OF_UP:
         where.fail("up", f"is {up.tolist()}, along forward, {forward.tolist()}; must not be. Turn one of them.")
-    pattern = light.pattern
+    _pattern(light.pattern, where)
+    _power(light.intensity.scaled(max(1.0, float(light.pattern.shares.max()))), where, "intensity (times the largest share)")
+
+
+def _pattern(pattern: BeamPattern, where: _Place) -> None:
     if pattern.shares.ndim != 2 or min(pattern.shares.shape) < 2:
         where.fail("pattern", f"has shape {pattern.shares.shape}; must be (rows, cols), at least 2 each.")
     if not np.all(np.isfinite(pattern.shares)) or pattern.shares.min() < 0 or not pattern.shares.max() > 0:
@@ -408,7 +417,6 @@ def _goniometric(light: GoniometricLight, where: _Place) -> None:
     ):
         if not -limit <= first < last <= limit:
             where.fail(f"pattern.{name}", f"is {first:g} to {last:g}; must go up, within -{limit:g} to {limit:g}.")
-    _power(light.intensity.scaled(max(1.0, float(pattern.shares.max()))), where, "intensity (times the largest share)")
 
 
 _LEAST_SINE_OF_UP = 1e-3

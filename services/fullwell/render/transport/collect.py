@@ -16,7 +16,7 @@ from fullwell.render.conditioning import (
     with_whole_normals,
     without_repeated_faces,
 )
-from fullwell.render.transport.surfaces import CurvedShape, PartRecord, SceneSurfaces
+from fullwell.render.transport.surfaces import CurvedShape, PartRecord, PlacedPattern, SceneSurfaces
 from fullwell.scene import Cylinder, Dielectric, Disk, Material, Mesh, Part, SceneDescription, Sphere
 from fullwell.scene.groups import group_names
 from fullwell.scene.tessellate import is_similarity, mesh_of, transform_mesh
@@ -37,8 +37,12 @@ _SMALLEST_REACH_M = 1e-6
 """Scenes of a thirtieth of this are still right; below, the products of coordinates by which triangles are traced underflow."""
 
 
-def collect_surfaces(scene: SceneDescription, centre_m: NDArray[np.float64]) -> SceneSurfaces:
+def collect_surfaces(
+    scene: SceneDescription, centre_m: NDArray[np.float64], groups: tuple[str, ...] | None = None
+) -> SceneSurfaces:
     """Return the surfaces of a scene with the world point `centre_m` [m] at the origin.
+
+    `groups` are the names of the light groups where the scene is a part of one that has more.
 
     Raises
     ------
@@ -49,7 +53,7 @@ def collect_surfaces(scene: SceneDescription, centre_m: NDArray[np.float64]) -> 
     check_reach(scene, centre_m, smallest_m=_SMALLEST_REACH_M)
     recentre = np.eye(4)
     recentre[:3, 3] = -np.asarray(centre_m, dtype=np.float64)
-    collector = _Collector(group_names(scene))
+    collector = _Collector(group_names(scene) if groups is None else groups)
     for index, scene_object in enumerate(scene.objects):
         for number, part in enumerate(scene_object.parts):
             with naming(scene_object.id, index, number):
@@ -92,7 +96,10 @@ class _Collector:
             self.pieces.append(_Piece(mesh, len(self.parts), radiance is not None))
         else:
             self.curved.append((curved, radiance is not None))
-        self.parts.append(PartRecord(object_index, self._material(part.material), radiance, group))
+        pattern = None
+        if radiance is not None and part.emission is not None and part.emission.pattern is not None:
+            pattern = PlacedPattern(part.emission.pattern, _axes(to_world))
+        self.parts.append(PartRecord(object_index, self._material(part.material), radiance, group, pattern))
 
     def _material(self, material: Material) -> int:
         number = self.material_numbers.get(id(material))
@@ -121,6 +128,14 @@ class _Collector:
             materials=tuple(self.materials),
             groups=self.groups,
         )
+
+
+def _axes(to_world: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (3, 3) unit columns forward, left and up of a part: where it is mirrored, its left is on the other side."""
+    forward, up = to_world[:3, 0] / np.linalg.norm(to_world[:3, 0]), to_world[:3, 2]
+    left = np.cross(up, forward)
+    left /= np.linalg.norm(left)
+    return np.column_stack([forward, left, np.cross(forward, left)])
 
 
 def _curved(part: Part, to_world: NDArray[np.float64], number: int) -> CurvedShape | None:

@@ -15,7 +15,7 @@ __all__ = ["CYLINDER", "DISK", "LEAF_FLOATS", "SPHERE", "LeafTable", "ShapeSampl
 LEAF_FLOATS = 12
 """A triangle: corner and spectrum row, first edge and group, second edge. A curved shape: centre and row, axis and group,
 radius [m], half height [m] and kind. A point: place and row, axis and group, angle where a spot ends, 1 / (width of its edge),
-both 0 where the light is no spot, 0, and the number of its pattern from 1, 0 where it has none."""
+both 0 where the light is no spot, and 0. All: the number of a pattern from 1, 0 for none."""
 
 SPHERE, DISK, CYLINDER = 0.0, 1.0, 2.0
 
@@ -271,8 +271,11 @@ class LeafTable:
         nothing = dr.zeros(self._mi.Vector3f, dr.width(distance2))
         return ShapeSample(direction, dr.sqrt(distance2), dr.select(good, 1.0, 0.0), nothing), scale
 
-    def pattern(self, record: tuple[Any, Any, Any]) -> tuple[Any, Any]:
-        """Return the number of a point's pattern, from 1 (0 for none), and the direction in which it points."""
-        second, third = record[1:]
-        number = self._dr.reinterpret_array(self._mi.UInt32, third.w)
-        return number, self._mi.Vector3f(second.x, second.y, second.z)
+    def pattern(self, record: tuple[Any, Any, Any]) -> Any:
+        """Return the number of a lamp's pattern, from 1; 0 for none."""
+        return self._dr.reinterpret_array(self._mi.UInt32, record[2].w)
+
+    def pattern_of(self, leaf: Any, active: Any) -> Any:
+        """Return the number of a leaf's pattern, from 1; 0 for none."""
+        place = leaf * LEAF_FLOATS + (LEAF_FLOATS - 1)
+        return self._dr.reinterpret_array(self._mi.UInt32, self._dr.gather(self._mi.Float, self._records, place, active))

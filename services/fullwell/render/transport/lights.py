@@ -25,7 +25,7 @@ from fullwell.render.transport.environment import (
 from fullwell.render.transport.light_shapes import CYLINDER, DISK, LEAF_FLOATS, SPHERE, LeafTable
 from fullwell.render.transport.light_tree import LeafBounds, TreeWalk, build_light_tree
 from fullwell.render.transport.patterns import PatternTable, pattern_bounds
-from fullwell.render.transport.surfaces import CurvedShape, SceneSurfaces
+from fullwell.render.transport.surfaces import CurvedShape, PlacedPattern, SceneSurfaces
 from fullwell.render.transport.upload import upload
 from fullwell.render.transport.wavelengths import SpectraTable, look_up
 from fullwell.scene import (
@@ -134,7 +134,7 @@ class LightSet:
         if len(finite):
             features |= {"tree"} | collected.kinds(finite)
             if "pattern" in features:
-                self._patterns = PatternTable(mi, collected.patterned)
+                self._patterns = PatternTable(mi, collected.patterns)
             tree = build_light_tree(collected.bounds(finite), finite)
             self._walk = TreeWalk(mi, tree, finite, len(collected.records))
             irradiance["tree"] = _typical_irradiance(collected, finite, surfaces, scene_radius_m)
@@ -250,20 +250,23 @@ class LightSet:
             clearance = dr.select(is_curved, curved.clearance, clearance)
         if "point" in self.features:
             (single, falloff), delta = self._leaves.sample_point(record, point), self._leaves.is_point(leaf)
-            if "pattern" in self.features:
-                number, forward = self._leaves.pattern(record)
-                patterned = active & delta & (number > 0)
-                share = self._patterns.share(number - 1, forward, -single.direction, patterned)
-                falloff = dr.select(patterned, falloff * share, falloff)
-                single.pdf = dr.select(patterned & ~(share > 0), 0.0, single.pdf)
             direction = dr.select(delta, single.direction, direction)
             distance = dr.select(delta, single.distance, distance)
             pdf = dr.select(delta, single.pdf, pdf)
             clearance = dr.select(delta, single.clearance, clearance)
             scale = dr.select(delta, falloff, scale)
+        if "pattern" in self.features:
+            scale = scale * self._share_towards(self._leaves.pattern(record), -direction, active)
+            pdf = dr.select(scale > 0, pdf, 0.0)
         pdf = dr.select(active, pdf * probability * self._share["tree"], 0.0)
         no_dome = dr.zeros(mi.Bool, dr.width(pdf))
         return LightSample(direction, distance, clearance, pdf, delta, group, row, scale, no_dome, self)
+
+    def _share_towards(self, number: Any, towards: Any, active: Any) -> Any:
+        """Return the share of a lamp's light that goes in a direction; 1 for lamps without a pattern, whose number is 0."""
+        patterned = active & (number > 0)
+        share = self._patterns.share(number - 1, towards, patterned)
+        return self._dr.select(patterned, share, 1.0)
 
     def _sample_environment(self, point: Any, normal: Any, u_select: Any, u: Any, active: Any) -> LightSample:
         mi, dr = self._mi, self._dr
@@ -331,6 +334,10 @@ class LightSet:
         mi, dr = self._mi, self._dr
         row = dr.gather(mi.UInt32, self._emission, leaf * 2, active)
         return row, dr.gather(mi.UInt32, self._emission, leaf * 2 + 1, active)
+
+    def hit_share(self, leaf: Any, direction: Any, active: Any) -> Any:
+        """Return the share of that radiance which a ray of this direction meets; only where "pattern" is among the features."""
+        return self._share_towards(self._leaves.pattern_of(leaf, active), -direction, active)
 
     def hit_density(  # noqa: PLR0917 - a ray, its two ends and a mask
         self, leaf: Any, origin: Any, origin_normal: Any, direction: Any, distance: Any, light_normal: Any, active: Any
@@ -441,7 +448,7 @@ class _Collected:
         self._groups = {name: number for number, name in enumerate(surfaces.groups)}
         self._powers: dict[int, float] = {}
         placed = [light for light in lights if isinstance(light, PointLight | SpotLight | GoniometricLight)]
-        self.patterned: list[GoniometricLight] = []
+        self.patterns: list[PlacedPattern] = []
         self.triangles, self.curved = surfaces.emissive_faces, surfaces.emissive_curved
         total = self.triangles + self.curved + len(placed)
         self.records = np.zeros((max(1, total), LEAF_FLOATS), dtype=np.float32)
@@ -472,6 +479,13 @@ class _Collected:
     def _group(self, name: str) -> int:
         return self._groups[name]
 
+    def _pattern(self, placed: PlacedPattern | None) -> int:
+        """Return the number of a pattern among those of the scene, from 1; 0 for none."""
+        if placed is None:
+            return 0
+        self.patterns.append(placed)
+        return len(self.patterns)
+
     def _add_triangles(self, surfaces: SceneSurfaces) -> None:
         count = self.triangles
         if count == 0:
@@ -481,16 +495,17 @@ class _Collected:
         crossed = np.cross(first, second)
         doubled = np.linalg.norm(crossed, axis=1)
         part_of = surfaces.face_part[:count]
-        rows, groups = np.zeros((2, len(surfaces.parts)), dtype=np.uint32)
+        rows, groups, patterns = np.zeros((3, len(surfaces.parts)), dtype=np.uint32)
         powers = np.zeros(len(surfaces.parts))
         for number in np.unique(part_of):
             part = surfaces.parts[number]
             rows[number] = SpectraTable.BLACK if part.radiance is None else self._spectra.add(part.radiance)
             groups[number] = part.group
+            patterns[number] = self._pattern(part.pattern)
             powers[number] = self.power(int(rows[number])) * self._group_weights[part.group]
         record, names = self.records[:count], self._names[:count]
         record[:, 0:3], record[:, 4:7], record[:, 8:11] = corners[:, 0], first, second
-        names[:, 3], names[:, 7] = rows[part_of], groups[part_of]
+        names[:, 3], names[:, 7], names[:, 11] = rows[part_of], groups[part_of], patterns[part_of]
         self.low_m[:count], self.high_m[:count] = corners.min(axis=1), corners.max(axis=1)
         middle = 0.5 * (self.low_m[:count] + self.high_m[:count])
         self.radius_m[:count] = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
@@ -511,7 +526,7 @@ class _Collected:
         }[shape.kind]
         self.records[leaf, 0:3], self.records[leaf, 4:7] = centre, axis
         self.records[leaf, 8:11] = radius, half_height, kind
-        self._names[leaf, 3], self._names[leaf, 7] = row, part.group
+        self._names[leaf, 3], self._names[leaf, 7], self._names[leaf, 11] = row, part.group, self._pattern(part.pattern)
         self.low_m[leaf], self.high_m[leaf] = centre - reach, centre + reach
         self.radius_m[leaf] = np.hypot(radius, half_height)
         if shape.kind == "disk":
@@ -534,9 +549,8 @@ class _Collected:
         largest = 1.0
         if isinstance(light, GoniometricLight):
             frame, bounds = light.frame(), pattern_bounds(light.pattern)
-            self.patterned.append(light)
-            self.records[leaf, 4:7], self.axis[leaf] = frame[:, 0], frame @ bounds.axis
-            self._names[leaf, 11] = len(self.patterned)
+            self.axis[leaf] = frame @ bounds.axis
+            self._names[leaf, 11] = self._pattern(PlacedPattern(light.pattern, frame))
             self.spread_rad[leaf], self.emission_rad[leaf] = bounds.bright_rad, bounds.end_rad
             largest = float(light.pattern.shares.max())
         self._names[leaf, 3], self._names[leaf, 7] = row, group
@@ -572,8 +586,8 @@ class _Collected:
             kinds.add("curved")
         if np.any(leaves >= self.triangles + self.curved):
             kinds.add("point")
-            if self.patterned:
-                kinds.add("pattern")
+        if self.patterns:
+            kinds.add("pattern")
         return kinds
 
     def bounds(self, leaves: NDArray[np.int64]) -> LeafBounds:

@@ -274,6 +274,8 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
                     hit.leaf, last_point, last_normal, direction, between, hit.front_normal, shines & (last_density > 0)
                 )
                 share = dr.select(last_density > 0, last_density / (last_density + other), 1.0)
+                if "pattern" in self._lights.features:
+                    share *= self._lights.hit_share(hit.leaf, direction, shines)
                 radiance = self._added(
                     radiance, throughput * look_up(mi, given.tables["spectra"], row, cell_list) * share, group
                 )

@@ -9,9 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fullwell.radiometry.spectrum import Spectrum
-from fullwell.scene import Material
+from fullwell.scene import BeamPattern, Material
 
-__all__ = ["CurvedShape", "PartRecord", "SceneSurfaces"]
+__all__ = ["CurvedShape", "PartRecord", "PlacedPattern", "SceneSurfaces"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlacedPattern:
+    """A pattern and the (3, 3) unit columns forward, left and up of its axes in the world."""
+
+    pattern: BeamPattern
+    frame: NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,12 +36,15 @@ class PartRecord:
         Emitted on the side of the normal [W m^-2 sr^-1 nm^-1], or None.
     group
         Index into ``SceneSurfaces.groups`` of what is emitted.
+    pattern
+        How what is emitted is spread over directions, or None for evenly.
     """
 
     object_index: int
     material: int
     radiance: Spectrum | None = None
     group: int = 0
+    pattern: PlacedPattern | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

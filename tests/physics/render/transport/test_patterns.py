@@ -7,13 +7,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from light_scenes import NO_NORMAL, UP, Lit, lamps, rectangle
+from test_analytic_scenes import camera, radiance_w
 
 from fullwell.core.errors import FieldError
-from fullwell.radiometry.spectrum import Spectrum
+from fullwell.radiometry import Spectrum, WavelengthGrid
 from fullwell.render import choose_variant
 from fullwell.render.transport.patterns import pattern_bounds
 from fullwell.render.variant import activate
-from fullwell.scene import BeamPattern, GoniometricLight, PointLight, SceneDescription
+from fullwell.scene import (
+    BeamPattern,
+    Diffuse,
+    Emission,
+    GoniometricLight,
+    Mesh,
+    Part,
+    PointLight,
+    Principled,
+    Rectangle,
+    SceneDescription,
+    SceneObject,
+)
 from fullwell.scene.validate import check_scene
 
 CLOSED_FORM = 1e-3
@@ -136,3 +149,79 @@ def test_bounds_hold_the_whole_beam() -> None:
 def test_patterns_that_cannot_be_are_refused(change, said: str) -> None:
     with pytest.raises(FieldError, match=said):
         check_scene(SceneDescription((), (replace(lamp(hilly()), **change),)))
+
+
+# Surfaces ------------------------------------------------------------------------------------------------------------
+
+
+def even_ground() -> SceneObject:
+    return SceneObject("ground", "", (Part(Rectangle((60.0, 60.0)), Diffuse(Spectrum.constant(0.5))),))
+
+
+def panel(pattern: BeamPattern | None, *, half_m: float = 0.05, height_m: float = 4.0) -> SceneObject:
+    """A square lamp that looks down, its own x axis forward and its z axis up; the mesh's front is below."""
+    a = half_m
+    corners = np.array([[-a, -a, 0], [-a, a, 0], [a, a, 0], [a, -a, 0]], dtype=float)
+    mesh = Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.uint32))
+    to_world = np.eye(4)
+    to_world[:3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    to_world[2, 3] = height_m
+    emission = Emission(Spectrum.constant(7.0), pattern=pattern)
+    return SceneObject("lamp", "", (Part(mesh, Diffuse(Spectrum.constant(0.0)), emission=emission),), to_world)
+
+
+def seen(scene: SceneDescription, view, *, spp: int = 64, depth: int = 2) -> np.ndarray:
+    return radiance_w(scene, view, spp=spp, depth=depth, grid=WavelengthGrid(500.0, 600.0, 50.0))
+
+
+@needs_llvm
+def test_a_lamp_with_a_pattern_looks_as_bright_as_its_share_that_way() -> None:
+    pattern = hilly(azimuth_deg=(-180.0, 180.0), elevation_deg=(-90.0, 0.0))
+    lamp_up = panel(pattern, half_m=0.5)
+    for azimuth_deg, elevation_deg in ((0.0, -60.0), (70.0, -45.0), (-130.0, -80.0), (170.0, -30.0)):
+        azimuth, elevation = np.radians([azimuth_deg, elevation_deg])
+        own = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+        eye = lamp_up.to_world[:3, 3] + 30.0 * (lamp_up.to_world[:3, :3] @ own)
+        view = camera(origin=tuple(eye), target=tuple(lamp_up.to_world[:3, 3]), rows=4, cols=4, hfov_deg=0.002)
+        image = seen(SceneDescription((lamp_up,)), view, spp=4, depth=1)
+        assert image.mean() == pytest.approx(7.0 * float(pattern.share(azimuth_deg, elevation_deg)), rel=CLOSED_FORM)
+
+
+@needs_llvm
+def test_a_small_lamp_with_a_pattern_lights_the_ground_by_it() -> None:
+    """Area, radiance, share, both cosines, distance: the form of a point for a panel of 10 cm at 4 m."""
+    pattern = hilly(40, 60, (-180.0, 180.0), (-90.0, 0.0))
+    waves = np.sin(3 * pattern.azimuths_rad())[None] * np.cos(pattern.elevations_rad())[:, None] ** 2
+    smooth = BeamPattern((1.0 + 0.8 * waves).astype(np.float32), pattern.azimuth_deg, pattern.elevation_deg)
+    lamp_up = panel(smooth)
+    for x, y in ((0.5, 3.0), (-4.0, 1.0), (2.0, -2.5)):
+        view = camera(origin=(x, y, 3.0), target=(x, y, 0.0), rows=4, cols=4, hfov_deg=1.0)
+        image = seen(SceneDescription((even_ground(), lamp_up)), view, spp=4096)
+        way = np.array([x, y, -4.0])
+        own = lamp_up.to_world[:3, :3].T @ (way / np.linalg.norm(way))
+        share = smooth.share(np.degrees(np.arctan2(own[1], own[0])), np.degrees(np.arcsin(own[2])))
+        cosine = 4.0 / np.linalg.norm(way)
+        expected = 0.5 / np.pi * 7.0 * float(share) * 0.01 * cosine**2 / (way @ way)
+        assert image.mean() == pytest.approx(expected, rel=3e-3)
+
+
+@needs_llvm
+def test_rays_that_meet_a_wide_patterned_lamp_and_lamps_that_are_looked_for_agree() -> None:
+    """A glossy floor close under a wide lamp: both ways matter, and the same lamp in 2 and in 200 triangles gives one image."""
+    pattern = hilly(20, 30, (-180.0, 180.0), (-90.0, 0.0))
+    floor = SceneObject("floor", "", (Part(Rectangle((4.0, 4.0)), Principled(Spectrum.constant(0.5), 0.3)),))
+    lamp_up = panel(pattern, half_m=1.0, height_m=1.0)
+    cells = 10
+    edge = np.linspace(-1.0, 1.0, cells + 1)
+    x, y = np.meshgrid(edge, edge, indexing="ij")
+    corner = np.arange((cells + 1) ** 2).reshape(cells + 1, cells + 1)
+    a, b, c, d = (corner[i : i + cells, j : j + cells].ravel() for i, j in ((0, 0), (0, 1), (1, 1), (1, 0)))
+    fine = Mesh(
+        np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1),
+        np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]).astype(np.uint32),
+    )
+    (part,) = lamp_up.parts
+    many = replace(lamp_up, parts=(replace(part, geometry=fine),))
+    view = camera(origin=(0.0, -3.0, 0.8), target=(0.0, 0.0, 0.0), rows=6, cols=8, hfov_deg=20.0)
+    few, split = (seen(SceneDescription((floor, item)), view, spp=4096) for item in (lamp_up, many))
+    assert split.mean() == pytest.approx(few.mean(), rel=4e-3)
