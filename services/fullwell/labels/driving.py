@@ -41,6 +41,7 @@ def driving_document(labels: Labels, camera: Camera, facts: DrivingFacts) -> dic
         "image_size_px": [cols, rows],
         "intrinsics_px": _numbers(camera.intrinsics_px),
         "camera_to_world": _numbers(camera.camera_to_world),
+        "map": {"offset_m": _numbers(facts.map.offset_m), "projection": facts.map.projection or None},
         "camera_velocity": _velocity(motion.velocity_at(camera.camera_to_world[:3, 3]), camera),
         "ego": _ego(facts, camera),
         "objects": [_road_user(user, seen[user.object_id], camera) for user in facts.users if user.object_id in seen],

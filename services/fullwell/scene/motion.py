@@ -16,6 +16,7 @@ __all__ = [
     "EgoFacts",
     "GroundRegion",
     "LaneFacts",
+    "MapFacts",
     "Motion",
     "RoadUser",
     "SignalFacts",
@@ -170,6 +171,17 @@ class SignalFacts:
     links: tuple[SignalLinkFacts, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class MapFacts:
+    """Where the world lies on the map that it was made of: map = world + `offset_m` (east, north) [m].
+
+    `projection` is the map's, as a string of PROJ; "" where the file has none.
+    """
+
+    offset_m: tuple[float, float] = (0.0, 0.0)
+    projection: str = ""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class DrivingFacts:
     """A street at `time_s` [s] after the start of its traffic. Lanes and regions are those within range of a camera."""
@@ -181,6 +193,7 @@ class DrivingFacts:
     drivable: tuple[GroundRegion, ...]
     crossings: tuple[GroundRegion, ...]
     signals: tuple[SignalFacts, ...]
+    map: MapFacts = MapFacts()
 
     def motions(self) -> Mapping[str, Motion]:
         """Return {object id: motion} of what moves; everything else is at rest."""

@@ -207,3 +207,9 @@ def test_driving_labels_of_a_scene_without_traffic_are_refused() -> None:
     with pytest.raises(RecipeError, match=r"asks for driving\.json, which tells of a street; add scene\.traffic") as caught:
         load_recipe(recipe)
     assert caught.value.path == "outputs"
+
+
+def test_the_map_of_the_facts_is_that_of_the_network(view: StreetView, facts: DrivingFacts) -> None:
+    point = np.array([12.0, -3.0])
+    assert point + facts.map.offset_m == pytest.approx(view.street.network.to_map(point))
+    assert facts.map.projection == "", "a drawn network has none"

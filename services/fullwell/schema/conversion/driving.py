@@ -13,6 +13,7 @@ from fullwell.scene.motion import (
     EgoFacts,
     GroundRegion,
     LaneFacts,
+    MapFacts,
     RoadUser,
     SignalFacts,
     SignalLinkFacts,
@@ -55,7 +56,14 @@ def driving_facts(view: StreetView, *, places_m: Sequence[Any], range_m: float, 
         drivable=tuple(_regions(street, street.plan.carriageway, origins, range_m)),
         crossings=tuple(_regions(street, street.plan.crossings, origins, range_m)),
         signals=tuple(_signal(item, street, moment.signals) for item in moment.assets if item.role == "signal"),
+        map=_map(street),
     )
+
+
+def _map(street: Street) -> MapFacts:
+    east, north = street.network.to_map(np.zeros(2)).tolist()
+    projection = street.network.location.get("projParameter", "!")
+    return MapFacts((east, north), "" if projection in ("!", "-", ".") else projection)
 
 
 def _user(item: PlacedAsset) -> RoadUser:
