@@ -71,7 +71,7 @@ class _Writer:
     def _material(self, part: LoadedPart) -> dict[str, Any]:
         surface: dict[str, Any] = {"metallicFactor": part.metallic, "roughnessFactor": part.roughness}
         if part.base_color_texture is None:
-            surface["baseColorFactor"] = [*srgb_to_linear(np.array(part.base_color_srgb)).tolist(), 1.0]
+            surface["baseColorFactor"] = [*_linear(part.base_color_srgb), 1.0]
         else:
             surface["baseColorTexture"] = {"index": self._texture(part.base_color_texture)}
         material: dict[str, Any] = {
@@ -88,7 +88,7 @@ class _Writer:
             },
         }
         if part.emissive_srgb is not None:
-            material["emissiveFactor"] = srgb_to_linear(np.array(part.emissive_srgb)).tolist()
+            material["emissiveFactor"] = _linear(part.emissive_srgb)
         return material
 
     def _texture(self, pixels: NDArray[np.uint8]) -> int:
@@ -231,6 +231,11 @@ def _y_up(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
 def _z_up(vectors: NDArray[np.float32]) -> NDArray[np.float64]:
     # Adding zero turns the -0 that a change of sign left into 0.
     return np.stack([vectors[:, 0], -vectors[:, 2], vectors[:, 1]], axis=1).astype(np.float64) + 0.0
+
+
+def _linear(srgb: tuple[float, float, float]) -> list[float]:
+    """Return a colour for viewers; its last bits, which differ between machines, would change the file's digest."""
+    return [round(float(value), 7) for value in srgb_to_linear(np.array(srgb))]
 
 
 def _triple(values: Sequence[float]) -> tuple[float, float, float]:

@@ -15,7 +15,7 @@ from fullwell.assets.model import LoadedPart
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
-__all__ = ["CoarserLevel", "Simplifier", "surface_distance_m"]
+__all__ = ["CoarserLevel", "Simplifier", "crowd_distance_m", "surface_distance_m"]
 
 Array = NDArray[np.float64]
 
@@ -183,6 +183,25 @@ def _distances(surface: _Surface, candidates: NDArray[np.int64], points: Array) 
 def surface_distance_m(part: LoadedPart, points_m: Array) -> float:
     """Return the largest distance [m] from any of (n, 3) points to a part's triangles: an upper bound, and a close one."""
     return _farthest(_surface_of(part.vertices_m, part.faces.astype(np.int64)), points_m)
+
+
+def crowd_distance_m(fine: Sequence[LoadedPart], rough: Sequence[LoadedPart]) -> float:
+    """Return the distance [m] within which 95 % of one thing's surface lies from the other's, either way, all parts together.
+
+    For crowds of leaves: of many fewer ones each stands in the midst of those that it replaces, and the farthest is no measure.
+    """
+    first, second = _whole(fine), _whole(rough)
+    ways = ((first, second), (second, first))
+    return max(float(np.quantile(_nearest(a, _looked_at(b))[1].min(axis=1), _CROWD_QUANTILE)) for a, b in ways)
+
+
+def _whole(parts: Sequence[LoadedPart]) -> _Surface:
+    starts = np.cumsum([0, *(len(part.vertices_m) for part in parts)])
+    faces = [part.faces.astype(np.int64) + start for part, start in zip(parts, starts[:-1], strict=True)]
+    return _surface_of(np.concatenate([part.vertices_m for part in parts]), np.concatenate(faces))
+
+
+_CROWD_QUANTILE: Final = 0.95
 
 
 def _farthest(surface: _Surface, points: Array) -> float:

@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fullwell.assets.classes import size_problems
 from fullwell.assets.ingest.archives import check_package, model_in, unpack
 from fullwell.assets.ingest.canonical import write_level
-from fullwell.assets.ingest.levels import Simplifier
+from fullwell.assets.ingest.levels import CoarserLevel, Simplifier, crowd_distance_m
 from fullwell.assets.ingest.mending import Mended, mend_part, part_area_m2
 from fullwell.assets.ingest.options import IngestError, IngestLimits, IngestOptions
 from fullwell.assets.ingest.pose import find_pose, posed_part
@@ -32,7 +33,7 @@ from fullwell.assets.records import (
     PreparedAsset,
     SourceRecord,
 )
-from fullwell.assets.starter.building import BuiltAsset, BuiltPart
+from fullwell.assets.starter.building import BuiltAsset, BuiltLevel, BuiltPart
 from fullwell.core.errors import FieldError
 from fullwell.core.hashing import sha256_hex
 
@@ -234,12 +235,13 @@ class _Draft:
     checks: tuple[Check, ...]
     blobs: Mapping[str, bytes]
     attributes: Mapping[str, float | str] = field(default_factory=dict)
+    coarser: tuple[CoarserLevel, ...] = ()
 
 
 def _finished(draft: _Draft, chosen: Sequence[_ChosenPart], options: IngestOptions, say: IngestProgress) -> PreparedAsset:
     parts = [entry.part for entry in chosen]
     attribution = draft.licence.attribution or draft.licence.spdx
-    levels, contents, level_check = _levels(parts, attribution, options, say)
+    levels, contents, level_check = _levels(parts, draft.coarser, attribution, options, say)
     low = np.min([part.vertices_m.min(axis=0) for part in parts], axis=0)
     high = np.max([part.vertices_m.max(axis=0) for part in parts], axis=0)
     length, width, height = (float(side) for side in high - low)
@@ -320,7 +322,11 @@ def _some(names: Sequence[str]) -> str:
 
 
 def _levels(
-    parts: Sequence[LoadedPart], attribution: str, options: IngestOptions, say: IngestProgress
+    parts: Sequence[LoadedPart],
+    coarser: Sequence[CoarserLevel],
+    attribution: str,
+    options: IngestOptions,
+    say: IngestProgress,
 ) -> tuple[tuple[LevelRecord, ...], dict[str, bytes], Check]:
     records: list[LevelRecord] = []
     blobs: dict[str, bytes] = {}
@@ -329,10 +335,28 @@ def _levels(
         content = write_level(level, attribution=attribution)
         digest = sha256_hex(content)
         blobs[digest] = content
-        records.append(LevelRecord(sum(len(part.faces) for part in level), digest, len(content), error_m))
+        records.append(LevelRecord(sum(len(part.faces) for part in level), digest, len(content), round(error_m, 6)))
 
     say(0.5, "level 0")
     keep(parts, 0.0)
+    for level in coarser:
+        keep(level.parts, level.error_m)
+    notes = ["made by its generator"] if coarser else _simplified(parts, records, keep, options, say)
+    counts = " / ".join(str(record.triangles) for record in records)
+    note = f" ({'; '.join(notes)})" if notes else ""
+    numbers = {f"error_{index}_m": record.error_m for index, record in enumerate(records) if index}
+    message = f"{len(records)} level{'s' if len(records) > 1 else ''} of {counts} triangles{note}."
+    return tuple(records), blobs, Check("levels", "ok", message, numbers)
+
+
+def _simplified(
+    parts: Sequence[LoadedPart],
+    records: Sequence[LevelRecord],
+    keep: Callable[[Sequence[LoadedPart], float], None],
+    options: IngestOptions,
+    say: IngestProgress,
+) -> list[str]:
+    """Keep the levels that simplifying gives; return why there are not more."""
     total = records[0].triangles
     diagonal_m = float(
         np.linalg.norm(
@@ -341,7 +365,7 @@ def _levels(
         )
     )
     simplifier = Simplifier(parts, max_error_m=_MAX_LEVEL_ERROR * diagonal_m, crease_deg=options.crease_deg)
-    notes = []
+    notes: list[str] = []
     for number, ratio in enumerate(options.level_ratios, start=1):
         if total * ratio < options.min_level_triangles:
             notes.append(f"1/{1 / ratio:.0f} would be too few")
@@ -353,11 +377,7 @@ def _levels(
         else:
             limit = _MAX_LEVEL_ERROR * diagonal_m
             notes.append(f"1/{1 / ratio:.0f} would move the surface by more than {limit:.2g} m")
-    counts = " / ".join(str(record.triangles) for record in records)
-    note = f" ({'; '.join(notes)})" if notes else ""
-    numbers = {f"error_{index}_m": record.error_m for index, record in enumerate(records) if index}
-    message = f"{len(records)} level{'s' if len(records) > 1 else ''} of {counts} triangles{note}."
-    return tuple(records), blobs, Check("levels", "ok", message, numbers)
+    return notes
 
 
 # Generated things ----------------------------------------------------------------------------------------------------
@@ -382,8 +402,7 @@ def prepare_built(
     low = np.min([part.vertices_m.min(axis=0) for part in parts], axis=0)
     high = np.max([part.vertices_m.max(axis=0) for part in parts], axis=0)
     shift = -np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
-    moved = [replace(part, vertices_m=part.vertices_m + shift) for part in parts]
-    mended = _mended(moved, options.crease_deg, make_normals=False)
+    mended = _mended(_moved(parts, shift), options.crease_deg, make_normals=False)
     if not mended:
         raise IngestError("the generated thing holds no triangles with an area.", path="parts", value=id)
     finished = [entry.part for entry in mended]
@@ -407,8 +426,22 @@ def prepare_built(
         checks=(size_check, *mending_checks(mended, removed_on_reading=0), watertight_check(finished)),
         blobs={},
         attributes=dict(built.attributes),
+        coarser=tuple(_built_level(level, shift, finished, options) for level in built.coarser),
     )
     return _finished(draft, chosen, options, lambda share, stage: None)
+
+
+def _moved(parts: Sequence[LoadedPart], shift_m: NDArray[np.float64]) -> list[LoadedPart]:
+    return [replace(part, vertices_m=part.vertices_m + shift_m) for part in parts]
+
+
+def _built_level(
+    level: BuiltLevel, shift_m: NDArray[np.float64], finest: Sequence[LoadedPart], options: IngestOptions
+) -> CoarserLevel:
+    """Return a coarser level that the generator made; its error is how far it is from the finest, or its grain."""
+    mended = _mended(_moved([_built_part(part) for part in level.parts], shift_m), options.crease_deg, make_normals=False)
+    parts = tuple(entry.part for entry in mended)
+    return CoarserLevel(parts, max(crowd_distance_m(finest, parts), level.grain_m))
 
 
 def _built_part(part: BuiltPart) -> LoadedPart:

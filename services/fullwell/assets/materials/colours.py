@@ -27,8 +27,7 @@ def display_srgb(material: SpectralMaterial) -> Colour:
     Coated bodies without the gloss of their coat, metals and mirrors by their reflectance at normal incidence, clear glass by
     what a pane lets through. Colours outside sRGB are clipped. For swatches and as base colour of web viewers.
     """
-    red, green, blue = (float(value) for value in linear_to_srgb(np.clip(_linear_srgb(_xyz(material)), 0.0, 1.0)))
-    return red, green, blue
+    return _encoded(np.clip(_linear_srgb(_xyz(material)), 0.0, 1.0))
 
 
 def emission_srgb(material: SpectralMaterial) -> Colour | None:
@@ -36,7 +35,12 @@ def emission_srgb(material: SpectralMaterial) -> Colour | None:
     if material.lamp is None:
         return None
     linear = np.maximum(_linear_srgb(tristimulus(material.lamp.spd)), 0.0)
-    red, green, blue = (float(value) for value in linear_to_srgb(linear / linear.max()))
+    return _encoded(linear / linear.max())
+
+
+def _encoded(linear: Array) -> Colour:
+    # Colours go into digests of assets; their last bits differ between machines.
+    red, green, blue = (round(float(value), 5) for value in linear_to_srgb(linear))
     return red, green, blue
 
 

@@ -8,6 +8,7 @@ Rev. Lett. 107, 258101 gives 1.8 to 2.3 for real trees).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,10 +129,17 @@ def colonised(
     return Wood(positions, np.concatenate(parents).astype(np.int64), np.full(total, 0.01))
 
 
-def bark(wood: Wood, *, thick_m: float, flare: float = 0.0, ridges: float = 0.0) -> tuple[Shape, Shape]:
+_SIDES: Final = (14, 6, 3)
+"""Of tubes of limbs, branches and twigs."""
+
+
+def bark(
+    wood: Wood, *, thick_m: float, flare: float = 0.0, ridges: float = 0.0, sides: tuple[int, int, int] = _SIDES
+) -> tuple[Shape, Shape]:
     """Return the trunk with all limbs thicker than `thick_m`, and the thinner branches, as smooth tubes.
 
-    `flare` widens the foot of the trunk by that fraction, `ridges` roughens its girth.
+    `flare` widens the foot of the trunk by that fraction, `ridges` roughens its girth; `sides` are those of limbs, branches and
+    twigs. With fewer sides than the usual ones tubes are so much thicker that they look as wide.
     """
     child = wood.main_child
     parent = wood.parent
@@ -150,12 +158,18 @@ def bark(wood: Wood, *, thick_m: float, flare: float = 0.0, ridges: float = 0.0)
     frames = _carried_frames(wood, child)
     girth = wood.radius_m[first]
     shapes = []
-    for low, high, sides in ((thick_m, np.inf, 14), (0.022, thick_m, 6), (0.0, 0.022, 3)):
-        member = (girth >= low) & (girth < high)
-        shapes.append(
-            _tubes(wood, member & (parent >= 0), leader, radius, frames=frames, sides=sides, ridges=ridges * (sides == 14))
-        )
+    spans = ((thick_m, np.inf), (0.022, thick_m), (0.0, 0.022))
+    for kind, (low, high) in enumerate(spans):
+        member = (girth >= low) & (girth < high) & (parent >= 0)
+        wider = _girth(_SIDES[kind]) / _girth(sides[kind])
+        ridged = ridges if kind == 0 else 0.0
+        shapes.append(_tubes(wood, member, leader, wider * radius, frames=frames, sides=sides[kind], ridges=ridged))
     return shapes[0], joined(shapes[1:])
+
+
+def _girth(sides: int) -> float:
+    """Perimeter of a regular polygon over that of the circle around it: its mean width over the circle's (Cauchy)."""
+    return sides / np.pi * float(np.sin(np.pi / sides))
 
 
 def _carried_frames(wood: Wood, child: Indices) -> tuple[Array, Array]:

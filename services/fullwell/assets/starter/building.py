@@ -11,7 +11,7 @@ import numpy as np
 from fullwell.assets.classes import asset_class
 from fullwell.assets.starter.shapes import Shape
 
-__all__ = ["BuiltAsset", "BuiltPart", "StarterEntry"]
+__all__ = ["BuiltAsset", "BuiltLevel", "BuiltPart", "StarterEntry"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,6 +25,14 @@ class BuiltPart:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class BuiltLevel:
+    """A coarser level of detail. `grain_m` is half the size of the pieces that many small ones became."""
+
+    parts: tuple[BuiltPart, ...]
+    grain_m: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class BuiltAsset:
     """A generated thing: metres, z up, facing +x, standing on z = 0; preparing centres it over its pivot.
 
@@ -35,12 +43,15 @@ class BuiltAsset:
         indicator_front_left, plate_rear, ...
     attributes
         Numbers and words of its class: front_overhang_m, wheelbase_m, mast_height_m, ...
+    coarser
+        Levels of detail, finest first, where the generator makes them itself; their parts have names of `parts`, maybe fewer.
     """
 
     asset_class: str
     tags: tuple[str, ...]
     parts: tuple[BuiltPart, ...]
     attributes: Mapping[str, float | str] = field(default_factory=dict)
+    coarser: tuple[BuiltLevel, ...] = ()
 
     def __post_init__(self) -> None:
         asset_class(self.asset_class)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fullwell.assets.starter.aggregates import GROUPS, coarser_plant, fewer_blades, fewer_cards, half_card_m
 from fullwell.assets.starter.branching import bark, card_area_m2, cards, colonised, noise, unit
-from fullwell.assets.starter.building import BuiltAsset, BuiltPart, StarterEntry
+from fullwell.assets.starter.building import BuiltAsset, BuiltLevel, BuiltPart, StarterEntry
 from fullwell.assets.starter.implicit import vertex_normals
 from fullwell.assets.starter.shapes import Shape, joined
 
@@ -35,7 +36,11 @@ def hedge(
     for y in np.arange(0.12 - size[1] / 2, size[1] / 2, 0.22):
         stems.append(_sprout(rng, np.array([rng.normal(0, 0.05), y, 0.0]), size, 46))
     inner = 0.86 * size
-    core = _lumpy_box(inner, 0.03, float(rng.uniform(0, 6))).moved(z_m=0.5 * inner[2] + 0.05)
+    lumps = float(rng.uniform(0, 6))
+
+    def core(rows: int) -> BuiltPart:
+        return BuiltPart("core", _lumpy_box(inner, 0.03, lumps, rows).moved(z_m=0.5 * inner[2] + 0.05), foliage)
+
     face, u, v, depth = (
         rng.integers(0, 7, leaf_count),
         *rng.uniform(-0.5, 0.5, (2, leaf_count)),
@@ -58,10 +63,14 @@ def hedge(
     leaves = _twig_leaves(rng, at, out, leaf_m)
     parts = [
         BuiltPart("branches", joined(stems), "bark/oak"),
-        BuiltPart("core", core, foliage),
+        core(24),
         BuiltPart("leaves", leaves, foliage),
     ]
-    return _plant("bush", ("hedge", *tags), parts, {"leaf_area_m2": round(card_area_m2(leaves), 2)})
+    coarser = []
+    for rows, group in zip((12, 6, 4), GROUPS, strict=True):
+        fewer = fewer_cards(leaves, group)
+        coarser.append(BuiltLevel((core(rows), BuiltPart("leaves", fewer, foliage)), half_card_m(fewer)))
+    return _plant("bush", ("hedge", *tags), parts, {"leaf_area_m2": round(card_area_m2(leaves), 2)}, coarser)
 
 
 def shrub(
@@ -104,7 +113,8 @@ def shrub(
         leaves = _twig_leaves(rng, at, out, leaf_m)
         area = card_area_m2(leaves)
         parts.append(BuiltPart("leaves", leaves, foliage))
-    return _plant("bush", ("shrub", *tags), parts, {"leaf_area_m2": round(area, 2)})
+    coarser = coarser_plant(parts, wood, thick=0.44)
+    return _plant("bush", ("shrub", *tags), parts, {"leaf_area_m2": round(area, 2)}, coarser)
 
 
 def grass_patch(
@@ -138,7 +148,18 @@ def grass_patch(
         parts.append(BuiltPart("dry_blades", _blades(at[dead], height[dead], heading[dead], tilt[dead], width_m), "grass/dry"))
     if ears:
         parts.append(BuiltPart("ears", _ears(rng, at[stalks], height[stalks], heading[stalks], tilt[stalks]), "grass/dry"))
-    return _plant("grass", tags, parts, {"blades": float(blades), "blade_height_m": height_m})
+    coarser = [_fewer_grass(parts, group, 0.5 * width_m) for group in GROUPS]
+    return _plant("grass", tags, parts, {"blades": float(blades), "blade_height_m": height_m}, coarser)
+
+
+def _fewer_grass(parts: list[BuiltPart], group: int, half_m: float) -> BuiltLevel:
+    fewer = tuple(
+        replace(part, shape=fewer_cards(part.shape, group))
+        if part.name == "ears"
+        else replace(part, shape=fewer_blades(part.shape, _BLADE_VERTICES, group))
+        for part in parts
+    )
+    return BuiltLevel(fewer, group * half_m)
 
 
 def rock(
@@ -175,8 +196,8 @@ def _sprout(rng: np.random.Generator, foot: Array, size: Array, count: int) -> S
     return joined(bark(wood, thick_m=0.008))
 
 
-def _lumpy_box(size: Array, lump_m: float, seed: float) -> Shape:
-    ball = _ball_mesh(24)
+def _lumpy_box(size: Array, lump_m: float, seed: float, rows: int) -> Shape:
+    ball = _ball_mesh(rows)
     corner = np.abs(ball.vertices_m).max(axis=1, keepdims=True)
     soft = (np.abs(ball.vertices_m) ** 10).sum(axis=1, keepdims=True) ** 0.1
     points = ball.vertices_m / (0.7 * soft + 0.3 * corner) * 0.5 * size
@@ -192,6 +213,9 @@ def _twig_leaves(rng: np.random.Generator, at: Array, out: Array, leaf_m: tuple[
     return cards(at, along, facing, leaf_m[0] * size, leaf_m[1] * size)
 
 
+_BLADE_VERTICES: Final = 7
+
+
 def _blades(at: Array, height: Array, heading: Array, tilt: Array, width_m: float) -> Shape:
     """Return blades of three bent pieces: five triangles each."""
     out = np.column_stack([np.cos(heading), np.sin(heading), np.zeros(len(at))])
@@ -204,7 +228,7 @@ def _blades(at: Array, height: Array, heading: Array, tilt: Array, width_m: floa
         half = 0.5 * width_m * width * side
         rows += [centre - half, centre + half] if t < 1.0 else [centre]
     vertices = np.stack(rows, axis=1)
-    start = 7 * np.arange(len(at))[:, None]
+    start = _BLADE_VERTICES * np.arange(len(at))[:, None]
     faces = [start + part for part in ([0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4], [4, 5, 6])]
     vertices = vertices.reshape(-1, 3)
     return Shape(np.column_stack([vertices[:, :2], np.maximum(vertices[:, 2], 0.0)]), np.concatenate(faces).astype(np.int64))
@@ -247,14 +271,25 @@ def _shaded(points: Array, faces: NDArray[np.int64]) -> Shape:
     return Shape(points, faces, vertex_normals(points, faces))
 
 
-def _plant(asset_class: str, tags: tuple[str, ...], parts: list[BuiltPart], attributes: dict[str, float | str]) -> BuiltAsset:
-    rounded = []
-    for part in parts:
-        vertices = np.round(part.shape.vertices_m, 5)
-        vertices[:, 2] = np.maximum(vertices[:, 2], 0.0)
-        rounded.append(replace(part, shape=replace(part.shape, vertices_m=vertices)))
+def _plant(
+    asset_class: str,
+    tags: tuple[str, ...],
+    parts: list[BuiltPart],
+    attributes: dict[str, float | str],
+    coarser: Sequence[BuiltLevel] = (),
+) -> BuiltAsset:
+    rounded = tuple(_rounded(part) for part in parts)
+    levels = tuple(
+        replace(level, parts=tuple(_rounded(part) for part in level.parts if len(part.shape.faces))) for level in coarser
+    )
     height = max(float(part.shape.vertices_m[:, 2].max()) for part in rounded)
-    return BuiltAsset(asset_class, tags, tuple(rounded), attributes | {"height_m": round(height, 3)})
+    return BuiltAsset(asset_class, tags, rounded, attributes | {"height_m": round(height, 3)}, levels)
+
+
+def _rounded(part: BuiltPart) -> BuiltPart:
+    vertices = np.round(part.shape.vertices_m, 5)
+    vertices[:, 2] = np.maximum(vertices[:, 2], 0.0)
+    return replace(part, shape=replace(part.shape, vertices_m=vertices))
 
 
 def _entry(name: str, title: str, seed: int, make: Callable[..., BuiltAsset], **parameters: object) -> StarterEntry:

@@ -7,15 +7,16 @@ Heights, crown and stem diameters are those of open-grown urban trees of middle 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fullwell.assets.starter.aggregates import coarser_plant
 from fullwell.assets.starter.branching import Wood, bark, card_area_m2, cards, colonised, noise, unit
-from fullwell.assets.starter.building import BuiltAsset, BuiltPart, StarterEntry
+from fullwell.assets.starter.building import BuiltAsset, BuiltLevel, BuiltPart, StarterEntry
 from fullwell.assets.starter.shapes import Shape, tube
 
 __all__ = ["TREES", "broadleaf", "pine", "spruce"]
@@ -125,7 +126,8 @@ def broadleaf(
         leaves_m2 = card_area_m2(leaves)
     if staked:
         parts += _stake(trunk_radius_m, bare_m)
-    return _tree(parts, species, ("broadleaf", *tags), trunk_radius_m, leaves_m2)
+    coarser = coarser_plant(parts, wood, thick=0.42, flare=0.45)
+    return _tree(parts, species, ("broadleaf", *tags), trunk_radius_m, leaves_m2, coarser=coarser)
 
 
 def _stem(rng: np.random.Generator, top_m: float, step_m: float, *, crooked: float) -> Array:
@@ -242,7 +244,8 @@ def spruce(
         BuiltPart("branches", branches, "bark/pine"),
         BuiltPart("leaves", needles, "foliage/conifer"),
     ]
-    return _tree(parts, species, ("conifer", "evergreen", *tags), trunk_radius_m, card_area_m2(needles))
+    coarser = coarser_plant(parts, bare, thick=0.6, flare=0.25)
+    return _tree(parts, species, ("conifer", "evergreen", *tags), trunk_radius_m, card_area_m2(needles), coarser=coarser)
 
 
 _Lists = tuple[list[Array], list[int], list[float], list[float]]
@@ -337,11 +340,20 @@ def pine(
         BuiltPart("branches", branches, "bark/pine"),
         BuiltPart("leaves", leaves, "foliage/conifer"),
     ]
-    return _tree(parts, species, ("conifer", "evergreen", *tags), trunk_radius_m, card_area_m2(leaves))
+    coarser = coarser_plant(parts, wood, thick=0.4, flare=0.3)
+    return _tree(parts, species, ("conifer", "evergreen", *tags), trunk_radius_m, card_area_m2(leaves), coarser=coarser)
 
 
-def _tree(parts: list[BuiltPart], species: str, tags: tuple[str, ...], trunk_radius_m: float, leaves_m2: float) -> BuiltAsset:
-    grounded = tuple(replace(part, shape=_rounded(part.shape)) for part in parts if len(part.shape.faces))
+def _tree(
+    parts: list[BuiltPart],
+    species: str,
+    tags: tuple[str, ...],
+    trunk_radius_m: float,
+    leaves_m2: float,
+    *,
+    coarser: tuple[BuiltLevel, ...],
+) -> BuiltAsset:
+    grounded = _grounded(parts)
     points = np.concatenate([part.shape.vertices_m for part in grounded])
     reach = float(np.ptp(points[:, :2], axis=0).mean() / 2)
     ground_m2 = float(np.pi * reach**2)
@@ -357,7 +369,12 @@ def _tree(parts: list[BuiltPart], species: str, tags: tuple[str, ...], trunk_rad
             "leaf_area_m2": round(leaves_m2, 1),
             "leaf_area_index": round(leaves_m2 / ground_m2, 2),
         },
+        tuple(replace(level, parts=_grounded(level.parts)) for level in coarser),
     )
+
+
+def _grounded(parts: Sequence[BuiltPart]) -> tuple[BuiltPart, ...]:
+    return tuple(replace(part, shape=_rounded(part.shape)) for part in parts if len(part.shape.faces))
 
 
 def _rounded(shape: Shape) -> Shape:
