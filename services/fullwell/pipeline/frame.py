@@ -29,7 +29,15 @@ from fullwell.pipeline.noise import SensorNoise
 from fullwell.pipeline.plan import FramePlan, plan_document, plan_frame
 from fullwell.pipeline.progress import CancelCheck, FrameProgress, ProgressCallback
 from fullwell.pipeline.stage_store import StageStore
-from fullwell.render import RenderedLight, choose_variant, query_depth, query_surfaces, render_light, tile_errors
+from fullwell.render import (
+    RenderedLight,
+    RenderStatistics,
+    choose_variant,
+    query_depth,
+    query_surfaces,
+    render_light,
+    tile_errors,
+)
 from fullwell.scene import Camera, ConstantEnvironment, Film, ImageEnvironment, SceneDescription, SunSky
 from fullwell.scene.images import OpticalImage, RawImage
 from fullwell.scene.motion import Motion
@@ -313,6 +321,7 @@ def _radiance_document(images: _Images, frame: FrameDescription) -> dict[str, An
         "passes": statistics.passes,
         "segments": statistics.segments,
         "bad_samples": statistics.bad_samples,
+        "motion": _motion_document(statistics),
         "clamped_fraction": statistics.clamped_fraction,
         "relative_standard_error_rms": float(np.sqrt(np.mean(np.square(relative)))) if relative.size else None,
         "noise_target": {
@@ -323,6 +332,18 @@ def _radiance_document(images: _Images, frame: FrameDescription) -> dict[str, An
             "unmet_tiles": statistics.unmet_tiles,
             "stopped_by": statistics.stopped_by,
         },
+    }
+
+
+def _motion_document(statistics: RenderStatistics) -> dict[str, Any] | None:
+    """Return how motion was rendered; None where nothing moved far enough."""
+    if statistics.moments == 1:
+        return None
+    step_px = statistics.moment_step_px
+    return {
+        "moments": statistics.moments,
+        "step_px": None if step_px < 0 else step_px,
+        "exposure_time_s": statistics.exposure_time_s,
     }
 
 
@@ -429,14 +450,19 @@ def _noise_document(
 
 
 def _shutter_document(raw: RawImage) -> dict[str, Any]:
-    """Return when the rows were exposed: row r starts at r times the line time after the first, of each capture."""
+    """Return when the rows were exposed: row r starts at r times the line time after the first, of each capture.
+
+    The scene and the labels are those of `scene_time_s`, the middle of the middle row's exposure.
+    """
+    middle_s = raw.row_middle_s
     return {
         "kind": "rolling" if raw.line_time_s > 0 else "global",
         "line_time_s": raw.line_time_s,
         "first_row_start_s": float(raw.row_start_s[0]),
         "last_row_start_s": float(raw.row_start_s[-1]),
-        "first_row_middle_s": float(raw.row_middle_s[0]),
-        "last_row_middle_s": float(raw.row_middle_s[-1]),
+        "first_row_middle_s": float(middle_s[0]),
+        "last_row_middle_s": float(middle_s[-1]),
+        "scene_time_s": float(middle_s[0] + middle_s[-1]) / 2,
     }
 
 

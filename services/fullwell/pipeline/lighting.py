@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fullwell.core.errors import FieldError
 from fullwell.core.hashing import digest_of
 from fullwell.isp import scene_illuminant
 from fullwell.optics import IDEAL_LENS, channels_suffice, diffraction_otf, form_channel_image, working_f_number
 from fullwell.pipeline.culling import leave_out
-from fullwell.pipeline.noise import SensorNoise
+from fullwell.pipeline.motion import MotionPlan, Timing, plan_motion
+from fullwell.pipeline.noise import SensorNoise, longest_capture
 from fullwell.pipeline.path_depth import choose_depth
 from fullwell.pipeline.steps import PlanStep
 from fullwell.radiometry import ChannelRadiance, Spectrum, WavelengthGrid
@@ -99,14 +102,16 @@ class LightPlan:
 
 def plan_light(frame: FrameDescription, rig: CameraRig, position: int, *, skip: bool = True) -> LightPlan:
     """Return what is to be rendered for the camera at `position`; with `skip` false nothing is left out."""
-    views = frame.views[position] if frame.views else (View(rig.sensors, frame.group_weights),)
+    own = View(rig.sensors, frame.group_weights)
+    motion = plan_motion(frame, rig, position, skip=skip)
+    views = _views_of_one_exposure(frame.views[position] if frame.views else (own,), own, motion)
     steps: list[PlanStep] = []
     sensors = (*(sensor for view in views for sensor in view.sensors), *rig.sensors)
     light = scene_illuminant(frame.scene, rig.camera) or Spectrum.constant(1.0)
     responses, places, bands, direct = _choose_form(frame, rig, sensors, light, skip=skip, steps=steps)
     means = _mean_wavelengths(frame.grid, responses, light)
     scene, keep_groups = _choose_groups(frame, rig, views, skip=skip, steps=steps)
-    scene, max_depth = _reduce(frame, rig, scene, keep_groups, skip=skip, steps=steps)
+    scene, max_depth = _reduce(frame, rig, scene, keep_groups, motion, skip=skip, steps=steps)
     quality = frame.quality
     goal = SamplingGoal(
         noise_ratio=quality.noise_ratio,
@@ -126,6 +131,7 @@ def plan_light(frame: FrameDescription, rig: CameraRig, position: int, *, skip: 
         goal=goal,
         targets=targets,
         group_importance=_importance(views) if keep_groups else (),
+        motion=motion.request(rig.camera, _metering(frame.grid, rig, places, position), dict(frame.group_weights)),
     )
     channels = {s.name: places[_channel_digest(s)] for s in rig.sensors} if direct else {}
     adaptive = goal.noise_ratio is not None or quality.max_sample_saturation is not None
@@ -140,8 +146,19 @@ def plan_light(frame: FrameDescription, rig: CameraRig, position: int, *, skip: 
             "lens": [rig.camera.lens.f_number, rig.camera.lens.magnification] if adaptive else None,
             "views": [[[[s.model, s.exposure] for s in v.sensors], list(v.group_weights)] for v in views] if adaptive else None,
         }
+        | motion.identity(dict(frame.group_weights))
     )
     return LightPlan(scene, request, channels, means, tuple(steps), identity)
+
+
+def _views_of_one_exposure(views: tuple[View, ...], own: View, motion: MotionPlan) -> tuple[View, ...]:
+    """Return the views that see the same light as the frame's own where something moves: those of the same exposure."""
+    if motion.timing is None:
+        return views
+    if motion.timing.automatic:  # found from this frame's own light
+        return (own,)
+    same = tuple(view for view in views if all(Timing.of(sensor) == motion.timing for sensor in view.sensors))
+    return same or (own,)
 
 
 # Channels or bands ---------------------------------------------------------------------------------------------------
@@ -314,17 +331,27 @@ def _importance(views: tuple[View, ...]) -> tuple[tuple[str, float], ...]:
 
 
 def _reduce(
-    frame: FrameDescription, rig: CameraRig, scene: SceneDescription, keep_groups: bool, *, skip: bool, steps: list[PlanStep]
+    frame: FrameDescription,
+    rig: CameraRig,
+    scene: SceneDescription,
+    keep_groups: bool,
+    motion: MotionPlan,
+    *,
+    skip: bool,
+    steps: list[PlanStep],
 ) -> tuple[SceneDescription, int]:
     """Return the scene without objects that cannot matter, and how many segments its paths have."""
     name = rig.camera.name
-    if skip:
+    if motion.runs:
+        what = f"{name}: objects out of view"
+        steps.append(PlanStep(what, "run", f"all {len(scene.objects)} objects are kept: what moves may bring them into view"))
+    elif skip:
         scene, step = leave_out(scene, rig.camera, frame.grid, weighted=keep_groups)
         steps.append(step)
     depth, step = choose_depth(scene, frame.grid, frame.quality.max_depth, camera_name=name, skip=skip)
     steps.append(step)
     steps.append(PlanStep(f"{name}: level of detail", "skip", _NO_LEVELS))
-    steps.append(PlanStep(f"{name}: motion", "skip", "nothing moves"))
+    steps.append(motion.step)
     return scene, depth
 
 
@@ -335,14 +362,7 @@ def _targets(
     grid: WavelengthGrid, rig: CameraRig, views: tuple[View, ...], places: dict[str, Places]
 ) -> tuple[tuple[tuple[tuple[str, float], ...], NoiseTarget], ...]:
     """Return (group weights, noise of the sensors) of each view."""
-
-    def time_of(sensor: SensorRig, light: NDArray[np.float64]) -> float:
-        anywhere_nm = np.full(len(light), 550.0)
-        radiance = ChannelRadiance(light, anywhere_nm, np.arange(len(light)), rig.camera.tangent_pitch)
-        image = form_channel_image(radiance, replace(rig.camera.lens, diffraction=False), IDEAL_LENS)
-        currents = ChannelCurrents(image.electrons, sensor.model.cfa, grid, image.sample_pitch_m)
-        return exposure_time(currents, sensor.model, sensor.exposure)
-
+    time_of = _exposure_finder(grid, rig)
     targets = []
     for view in views:
         sensors = []
@@ -353,6 +373,37 @@ def _targets(
         if sensors:
             targets.append((view.group_weights, SensorNoise(rig, tuple(sensors), time_of)))
     return tuple(targets)
+
+
+def _exposure_finder(grid: WavelengthGrid, rig: CameraRig) -> Callable[[SensorRig, NDArray[np.float64]], float]:
+    """Return what finds a sensor's base exposure time [s] from (channels, rows, cols) of light of its channels."""
+
+    def time_of(sensor: SensorRig, light: NDArray[np.float64]) -> float:
+        anywhere_nm = np.full(len(light), 550.0)
+        radiance = ChannelRadiance(light, anywhere_nm, np.arange(len(light)), rig.camera.tangent_pitch)
+        image = form_channel_image(radiance, replace(rig.camera.lens, diffraction=False), IDEAL_LENS)
+        currents = ChannelCurrents(image.electrons, sensor.model.cfa, grid, image.sample_pitch_m)
+        return exposure_time(currents, sensor.model, sensor.exposure)
+
+    return time_of
+
+
+def _metering(
+    grid: WavelengthGrid, rig: CameraRig, places: dict[str, Places], position: int
+) -> Callable[[NDArray[np.float64]], float]:
+    """Return what finds the exposure time [s] of the first sensor's longest capture from (responses, rows, cols) of light."""
+    sensor, time_of = rig.sensors[0], _exposure_finder(grid, rig)
+    of_sensor = places[_channel_digest(sensor)]
+
+    def metered(light: NDArray[np.float64]) -> float:
+        if max(map(max, of_sensor)) >= len(light):
+            path = f"cameras[{position}].sensors[0].exposure"
+            sentence = f"{path} is automatic, and the sensor has more channels than it can be found from while something moves."
+            raise FieldError(f"{sentence} Give exposure.time_s.", path=path)
+        channels = SensorNoise(rig, ((sensor, of_sensor),), time_of).channels(light)
+        return time_of(sensor, channels) * longest_capture(sensor)[0]
+
+    return metered
 
 
 def _sampling_step(frame: FrameDescription, rig: CameraRig, views: tuple[View, ...]) -> PlanStep:

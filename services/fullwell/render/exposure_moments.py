@@ -34,10 +34,10 @@ class MotionRequest:
         Of each row [s]; or what finds it from (responses, rows, cols) of light of the scene standing still.
     group_weights
         By the light group's name, in the light that the time is found from; 1 for those left out.
-    speed_px_per_s
-        How fast anything moves in the picture, at most, in film samples [px s^-1]; inf where that is not known.
+    shift_px
+        Returns how far anything moves in the picture within a time [s], at most [px]; inf where that is not known.
     least_px
-        Shift below which nothing is moved.
+        Shift from the first row's start to the last row's end up to which everything stands still.
     most_moments
         Bounds memory: each moment with another scene is one more scene.
     """
@@ -47,7 +47,7 @@ class MotionRequest:
     row_middle_s: NDArray[np.float64]
     exposure_time_s: float | Callable[[NDArray[np.float64]], float]
     group_weights: Mapping[str, float]
-    speed_px_per_s: float
+    shift_px: Callable[[float], float]
     least_px: float
     most_moments: int
 
@@ -56,13 +56,9 @@ class MotionRequest:
         """How much later the last row is exposed than the first [s]."""
         return float(np.ptp(self.row_middle_s))
 
-    def shift_px(self, exposure_time_s: float) -> float:
-        """Return how far anything moves from the first row's start to the last row's end, at most [px]."""
-        return self.speed_px_per_s * (exposure_time_s + self.readout_s)
-
 
 def count_moments(shift_px: float, *, least_px: float, most: int) -> int:
-    """Return the number of moments: each a shift of one film sample or less where `most` allows; 1 for nothing to move.
+    """Return the number of moments: each a shift of a pixel or less where `most` allows; 1 for nothing to move.
 
     A power of two, so that numbers of samples that are one too share evenly among them.
     """
@@ -74,7 +70,7 @@ def count_moments(shift_px: float, *, least_px: float, most: int) -> int:
 
 def cut_exposure(scene: SceneDescription, camera: Camera, request: MotionRequest, exposure_time_s: float) -> Moments | None:
     """Return scene and camera in the middle of each moment; None where nothing moves far enough."""
-    shift_px = request.shift_px(exposure_time_s)
+    shift_px = request.shift_px(exposure_time_s + request.readout_s)
     count = count_moments(shift_px, least_px=request.least_px, most=request.most_moments)
     if count == 1:
         return None

@@ -17,7 +17,7 @@ from fullwell.render.adaptive import NoiseTarget, SamplingGoal, SamplingOutcome,
 from fullwell.render.exposure_moments import MotionRequest, cut_exposure
 from fullwell.render.scalar import ScalarImage
 from fullwell.render.transport.moments import Moments
-from fullwell.render.transport.progressive import REPLICAS, ProgressiveImage, Reporter, Work
+from fullwell.render.transport.progressive import REPLICAS, ProgressiveImage, Reporter, Stage, Work
 from fullwell.render.variant import activate
 from fullwell.scene import Camera, SceneDescription
 from fullwell.scene.validate import check_camera
@@ -40,7 +40,7 @@ class RenderStatistics:
     clamped_fraction
         Share of the channels' light that a clamp of single samples took away; 0 without one.
     moments, moment_step_px, exposure_time_s
-        Moments that the exposure was cut into, 1 where nothing moved; how far anything moves in one, at most, in film samples,
+        Moments that the exposure was cut into, 1 where nothing moved; how far anything moves in one, at most [px],
         -1 where that is not known; and the exposure time of a row that the motion was rendered for [s], 0 without motion.
     wall_s, cpu_s
         Time, all threads' for `cpu_s`.
@@ -207,9 +207,14 @@ def render_light(
     )
     report = Reporter(progress, should_cancel)
     try:
-        motion = _Exposure() if request.motion is None else _exposed(mi, work, request.motion, report)
-        work = replace(work, moments=motion.moments)
-        image = ProgressiveImage(mi, work) if mi.variant().startswith("llvm") else ScalarImage(mi, work)
+        image: ProgressiveImage | ScalarImage
+        motion = _Exposure()
+        if request.motion is not None:
+            stage = _stage(mi, work, request.motion)
+            motion = _exposed(mi, work, stage, request.motion, report)
+            image = ProgressiveImage(mi, replace(work, moments=motion.moments), stage)
+        else:
+            image = ProgressiveImage(mi, work) if mi.variant().startswith("llvm") else ScalarImage(mi, work)
         views = [(_weights(image.groups, dict(by_name)), target) for by_name, target in request.targets]
         outcome = sample_until(image, request.goal, views, report=report, replicas=REPLICAS)
         image.check()
@@ -265,24 +270,30 @@ _METERING_SAMPLES = 4
 """Of each replica, in the picture of the scene standing still that an automatic exposure is found from."""
 
 
-def _exposed(mi: Any, work: Work, request: MotionRequest, report: Reporter) -> _Exposure:
-    """Find the exposure time where it is automatic, and cut it into moments."""
+def _stage(mi: Any, work: Work, request: MotionRequest) -> Stage:
+    """Load what stands still."""
     if not str(mi.variant()).startswith("llvm"):
         sentence = (
             "motion needs the compiled renderer; set quality.motion_blur_px to more than anything moves, or install libLLVM."
         )
         raise FieldError(sentence, path="quality.motion_blur_px")
+    moving = frozenset(item.id for item in work.scene.objects if item.id in request.motions)
+    return Stage(mi, work.scene, work.camera, moving)
+
+
+def _exposed(mi: Any, work: Work, stage: Stage, request: MotionRequest, report: Reporter) -> _Exposure:
+    """Find the exposure time where it is automatic, and cut it into moments."""
     time_s = request.exposure_time_s
     if callable(time_s):
         report(0.0)
-        still = ProgressiveImage(mi, replace(work, keep_bands=False, seed=seed32(work.seed, "metering")))
+        still = ProgressiveImage(mi, replace(work, keep_bands=False, seed=seed32(work.seed, "metering")), stage)
         still.add(np.arange(still.pixels), np.full(still.pixels, _METERING_SAMPLES), lambda _: report(0.0))
         mean = still.replicas().mean(axis=0, dtype=np.float64)
         time_s = time_s(np.tensordot(_weights(still.groups, request.group_weights), mean, axes=(0, 0)))
     moments = cut_exposure(work.scene, work.camera, request, time_s)
     if moments is None:
         return _Exposure(time_s=time_s)
-    step_px = request.shift_px(time_s) / moments.count
+    step_px = request.shift_px(time_s + request.readout_s) / moments.count
     return _Exposure(moments, step_px if np.isfinite(step_px) else -1.0, time_s)
 
 

@@ -115,6 +115,18 @@ class Geometry:
         self.tables["curved_of_shape"] = upload(mi.UInt32, table)
         self.tables["curved"] = upload(mi.Float, np.concatenate([_curved_record(shape) for shape in curved]))
 
+    def occluded(self, scene: Any, ray: Any, active: Any) -> Any:
+        """Return whether anything is in a ray's way."""
+        return scene.ray_test(ray, coherent=False, active=active)
+
+    def reach_m(self) -> float:
+        """Return the distance from the origin that no surface exceeds [m]; 1 where there is none."""
+        bounds = self.scene.bbox()
+        if not bounds.valid():
+            return 1.0
+        corner = np.maximum(np.abs(np.array(bounds.min).ravel()), np.abs(np.array(bounds.max).ravel()))
+        return float(np.linalg.norm(corner))
+
     def intersect(self, tables: Tables, scene: Any, ray: Any, active: Any) -> Hit:
         """Return what a ray meets first."""
         mi, dr = self._mi, self._dr

@@ -12,7 +12,7 @@ from fullwell.render.transport.collect import collect_surfaces
 from fullwell.render.transport.geometry import Geometry
 from fullwell.scene import SceneDescription
 
-__all__ = ["load_geometry"]
+__all__ = ["forget_geometry", "load_geometry"]
 
 _kept: list[tuple[SceneDescription, NDArray[np.float64], str, Geometry]] = []
 """The scene that was loaded last, by identity: descriptions are never changed once they are made."""
@@ -33,8 +33,13 @@ def load_geometry(mi: Any, scene: SceneDescription, centre_m: NDArray[np.float64
         if kept_scene is scene and kept_variant == variant and np.array_equal(kept_centre_m, centre_m):
             return geometry
     # The old scene goes before the new one comes: two would need twice the memory, and dead shapes keep their numbers.
-    _kept.clear()
-    gc.collect()
+    forget_geometry()
     loaded = Geometry(mi, collect_surfaces(scene, centre_m))
     _kept.append((scene, np.array(centre_m, dtype=np.float64), variant, loaded))
     return loaded
+
+
+def forget_geometry() -> None:
+    """Free the geometry that was loaded last, where nothing else holds it."""
+    _kept.clear()
+    gc.collect()

@@ -11,6 +11,7 @@ from fullwell.render.transport.geometry import Geometry, Tables
 from fullwell.render.transport.lights import LightSample, LightSet
 from fullwell.render.transport.materials import MaterialTable
 from fullwell.render.transport.sampler import PathSampler
+from fullwell.render.transport.split import SplitGeometry
 from fullwell.render.transport.wavelengths import CELL_COUNT, CELL_NM, FIRST_EDGE_NM, look_up
 
 __all__ = ["SLOTS", "Launch", "PathLoop", "PathSums"]
@@ -81,7 +82,7 @@ class PathLoop:
     def __init__(
         self,
         mi: Any,
-        geometry: Geometry,
+        geometry: Geometry | SplitGeometry,
         materials: MaterialTable,
         lights: LightSet,
         fog: FogLayer | None = None,
@@ -311,7 +312,7 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
                     useful = lit & (light.pdf > 0) & dr.any(value > 0)
                     start = hit.start(light.direction, mi, dr)
                     shadow = self._shadow_ray(start, hit.point, light)
-                    useful &= ~given.scene.ray_test(shadow, coherent=False, active=useful)
+                    useful &= ~self._geometry.occluded(given.scene, shadow, useful)
                     share = dr.select(light.delta, 1.0, light.pdf / (light.pdf + density))
                     arriving = light.radiance(given.tables["spectra"], cell_list) * (share / light.pdf)
                     if self._fog is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,16 +20,19 @@ from fullwell.render.transport.collect import collect_surfaces
 from fullwell.render.transport.fog import FogLayer
 from fullwell.render.transport.geometry import Geometry
 from fullwell.render.transport.lights import LightSet
-from fullwell.render.transport.loading import load_geometry
+from fullwell.render.transport.loading import forget_geometry, load_geometry
 from fullwell.render.transport.loop import SLOTS, Launch, PathLoop, PathSums
 from fullwell.render.transport.materials import MaterialTable
 from fullwell.render.transport.moments import Moments, Turns
 from fullwell.render.transport.replay import device_arrays, replayed
+from fullwell.render.transport.split import SplitGeometry
+from fullwell.render.transport.surfaces import SceneSurfaces
 from fullwell.render.transport.upload import upload
 from fullwell.render.transport.wavelengths import CELL_COUNT, CELL_NM, SpectraTable, cell_centres_nm, cell_means
 from fullwell.scene import Camera, SceneDescription
+from fullwell.scene.groups import group_names
 
-__all__ = ["REPLICAS", "ProgressiveImage", "Reporter", "Work", "check_samples"]
+__all__ = ["REPLICAS", "ProgressiveImage", "Reporter", "Stage", "Work", "check_samples"]
 
 REPLICAS = 4
 """Independent sequences per pixel. The spread of their means is the error of the image: each is stratified over all its
@@ -104,36 +107,68 @@ class Work:
     moments: Moments | None = None
 
 
+class Stage:
+    """What the pictures of one scene have in common: what stands still in all of them, and the materials.
+
+    `moving` are the ids of objects that may be elsewhere in another picture.
+    """
+
+    def __init__(self, mi: Any, scene: SceneDescription, camera: Camera, moving: frozenset[str] = frozenset()) -> None:
+        self._mi, self._moving = mi, moving
+        self.centre_m = np.asarray(camera.camera_to_world[:3, 3])
+        self._groups = group_names(scene)
+        self._materials: tuple[MaterialTable, SpectraTable] | None = None
+        self._still: Geometry | None = None
+        if moving:
+            forget_geometry()
+            self._still = self._loaded(scene, moving=False)
+
+    def _loaded(self, scene: SceneDescription, *, moving: bool) -> Geometry:
+        objects = tuple(item for item in scene.objects if (item.id in self._moving) == moving)
+        return Geometry(self._mi, collect_surfaces(replace(scene, objects=objects), self.centre_m, self._groups))
+
+    def geometry(self, scene: SceneDescription) -> Geometry | SplitGeometry:
+        """Return a scene on the device, which has the same objects as the first, all about the same point."""
+        if self._still is None:
+            return load_geometry(self._mi, scene, self.centre_m)
+        return SplitGeometry(self._mi, self._still, self._loaded(scene, moving=True))
+
+    def materials(self, surfaces: SceneSurfaces) -> tuple[MaterialTable, SpectraTable]:
+        """Return the materials on the device, and a table of their spectra to add others to."""
+        if self._materials is None:
+            spectra = SpectraTable()
+            self._materials = (MaterialTable(self._mi, spectra, surfaces.materials), spectra)
+        table, spectra = self._materials
+        return table, spectra.copy()
+
+
 class _Tracer:
     """One scene on the device: what the path loop needs of it."""
 
-    def __init__(  # noqa: PLR0917 - made in one place
-        self, mi: Any, work: Work, scene: SceneDescription, geometry: Geometry, weights: NDArray[np.float64], number: int
-    ) -> None:
+    def __init__(self, mi: Any, work: Work, scene: SceneDescription, stage: Stage, weights: NDArray[np.float64]) -> None:
+        geometry = stage.geometry(scene)
         surfaces = geometry.surfaces
-        spectra = SpectraTable()
+        self._materials, spectra = stage.materials(surfaces)
         importance = dict(work.group_importance)
-        centre_m = np.asarray(work.camera.camera_to_world[:3, 3])
-        self.geometry, self.number = geometry, number
-        self._materials = MaterialTable(mi, spectra, surfaces.materials)
         of_materials = spectra.count
         self._lights = LightSet(
             mi,
             spectra,
             surfaces,
             scene.lights,
-            centre_m=centre_m,
+            centre_m=stage.centre_m,
             weights=weights,
             group_weights=np.array([importance.get(name, 1.0) for name in surfaces.groups]),
-            scene_radius_m=_radius_m(geometry),
+            scene_radius_m=geometry.reach_m(),
         )
+        self.groups, self.scene = surfaces.groups, geometry.scene
         self.light_shape = _mean_shape(spectra, range(of_materials, spectra.count), weights)
         self.loop = PathLoop(
             mi,
             geometry,
             self._materials,
             self._lights,
-            None if scene.fog is None else FogLayer(mi, scene.fog, float(centre_m[2])),
+            None if scene.fog is None else FogLayer(mi, scene.fog, float(stage.centre_m[2])),
             wavelengths=work.wavelengths,
             channels=len(work.responses),
             groups=len(surfaces.groups) if work.keep_groups else 1,
@@ -145,10 +180,9 @@ class _Tracer:
 class _Moment:
     """A scene as a camera sees it at one time."""
 
-    def __init__(self, tracer: _Tracer, camera: CameraRays, shared: dict[str, Any]) -> None:
-        self.loop, self.camera = tracer.loop, camera
-        self.number = tracer.number
-        self.scene = tracer.geometry.scene
+    def __init__(self, tracer: _Tracer, camera: CameraRays, shared: dict[str, Any], number: int) -> None:
+        self.loop, self.camera, self.number = tracer.loop, camera, number
+        self.scene = tracer.scene
         self._tables_of_scene = tracer.tables
         self.share(shared)
 
@@ -205,12 +239,13 @@ def _lanes_by_moment(
 class ProgressiveImage:
     """Sums of samples so far. `add` takes more of them, anywhere; everything else looks at what is there."""
 
-    def __init__(self, mi: Any, work: Work) -> None:
+    def __init__(self, mi: Any, work: Work, stage: Stage | None = None) -> None:
+        """Load the scene, or the scenes of all moments; what several pictures share is in their `stage`."""
         import drjit as dr  # noqa: PLC0415 - the renderer is loaded late
 
         self._mi, self._work = mi, work
         self._weights = self._spectral_weights()
-        self._moments = self._moments_of(mi)
+        self._moments = self._moments_of(mi, stage or Stage(mi, work.scene, work.camera))
         self.groups: tuple[str, ...] = self._group_names if work.keep_groups else ("all",)
         self.rows, self.cols = work.camera.film.rows, work.camera.film.cols
         pixels, bands = self.rows * self.cols, work.grid.count
@@ -231,23 +266,24 @@ class ProgressiveImage:
             self._shared["stride"] = dr.opaque(mi.UInt32, self._turns.steps)
             self._share_tables()
 
-    def _moments_of(self, mi: Any) -> list[_Moment]:
-        """Load what the samples look at; a scene that several moments share is loaded once, all about the same point."""
-        work, centre_m = self._work, np.asarray(self._work.camera.camera_to_world[:3, 3])
+    def _moments_of(self, mi: Any, stage: Stage) -> list[_Moment]:
+        """Load what the samples look at; a scene that several moments share is loaded once."""
+        work = self._work
         scenes = (work.scene,) if work.moments is None else work.moments.scenes
         cameras = (work.camera,) if work.moments is None else work.moments.cameras
         tracers: dict[int, _Tracer] = {}
         for scene in scenes:
             if id(scene) not in tracers:
-                still = all(other is scene for other in scenes)
-                geometry = load_geometry(mi, scene, centre_m) if still else Geometry(mi, collect_surfaces(scene, centre_m))
-                tracers[id(scene)] = _Tracer(mi, work, scene, geometry, self._weights, len(tracers))
+                tracers[id(scene)] = _Tracer(mi, work, scene, stage, self._weights)
+        numbers = {key: number for number, key in enumerate(tracers)}
         first = tracers[id(scenes[0])]
-        self._group_names = first.geometry.surfaces.groups
+        self._group_names = first.groups
         # The same for all moments, so that a sample has the same wavelengths in each.
         self._shared = self._device_tables(first.light_shape)
-        pairs = zip(scenes, cameras, strict=True)
-        return [_Moment(tracers[id(scene)], CameraRays(mi, camera, centre_m), self._shared) for scene, camera in pairs]
+        return [
+            _Moment(tracers[id(scene)], CameraRays(mi, camera, stage.centre_m), self._shared, numbers[id(scene)])
+            for scene, camera in zip(scenes, cameras, strict=True)
+        ]
 
     def _share_tables(self) -> None:
         for moment in self._moments:
@@ -543,12 +579,3 @@ def _band_offsets(seed: int, pixels: int, bands: int) -> NDArray[np.uint32]:
     generator = np.random.Generator(np.random.Philox(key=seed32(seed, "bands")))
     first = generator.integers(0, bands, size=pixels, dtype=np.uint32)
     return np.asarray((first[:, None] + np.arange(REPLICAS) * bands // REPLICAS) % bands, dtype=np.uint32)
-
-
-def _radius_m(geometry: Geometry) -> float:
-    """Return the distance from the camera that no surface exceeds [m]."""
-    bounds = geometry.scene.bbox()
-    if not bounds.valid():
-        return 1.0
-    corner = np.maximum(np.abs(np.array(bounds.min).ravel()), np.abs(np.array(bounds.max).ravel()))
-    return float(np.linalg.norm(corner))

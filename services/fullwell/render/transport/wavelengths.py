@@ -48,6 +48,12 @@ class SpectraTable:
         self._known: dict[bytes, int] = {row.tobytes(): number for number, row in enumerate(self._rows)}
         self._of_spectrum: dict[int, tuple[Spectrum, int]] = {}
 
+    def copy(self) -> SpectraTable:
+        """Return a table with the same rows, which others may be added to."""
+        other = SpectraTable()
+        other._rows, other._known, other._of_spectrum = list(self._rows), dict(self._known), dict(self._of_spectrum)
+        return other
+
     def add(self, spectrum: Spectrum) -> int:
         """Return the row of a spectrum."""
         known = self._of_spectrum.get(id(spectrum))
