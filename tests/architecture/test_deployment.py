@@ -70,7 +70,7 @@ def test_every_service_of_the_compose_file_tells_its_health_and_waits_for_health
 def test_secrets_of_the_compose_file_have_no_default_and_are_in_the_example() -> None:
     text = (ROOT / "docker-compose.yml").read_text()
     example = (ROOT / ".env.example").read_text()
-    secret = r"(?:PASSWORD|SECRET_KEY|ACCESS_KEY|API_KEYS)"
+    secret = r"(?:PASSWORD|SECRET_KEY|ACCESS_KEY|API_KEYS|CURATOR_KEYS)"
     for name in set(re.findall(rf"(?<!\$)\$\{{(\w*{secret})\b", text)):
         assert re.search(rf"\$\{{{name}:\?", text), f"{name} may be left out"
         assert not re.search(rf"\$\{{{name}:?-", text), f"{name} has a default"
@@ -109,7 +109,7 @@ def test_manifests_hold_no_secret_values() -> None:
     for workload in _workloads():
         for container in workload["spec"]["template"]["spec"]["containers"]:
             for variable in container.get("env", []):
-                if re.search(r"PASSWORD|SECRET|ACCESS_KEY|API_KEYS", variable["name"]):
+                if re.search(r"PASSWORD|SECRET|ACCESS_KEY|API_KEYS|CURATOR_KEYS", variable["name"]):
                     assert "secretKeyRef" in variable.get("valueFrom", {}), variable["name"]
 
 
@@ -123,12 +123,17 @@ def test_a_worker_pod_outlives_its_longest_frame() -> None:
     assert int(settings["FULLWELL_MAX_MEMORY_PER_CHILD_MIB"]) < int(limit.removesuffix("Gi")) * 1024
 
 
-def test_workers_are_scaled_on_queued_and_running_frames() -> None:
+def test_workers_are_scaled_on_queued_and_running_frames_and_ingestions() -> None:
     scaled = _documents(AUTOSCALING / "scaledobject.yaml")[0]
-    assert scaled["spec"]["advanced"]["scalingModifiers"]["formula"] == "queued + running"
-    for trigger in scaled["spec"]["triggers"]:
-        assert trigger["type"] == "metrics-api", "the broker's lists do not hold running frames"
-        assert trigger["metadata"]["valueLocation"] == f'fullwell_frames{{state="{trigger["name"]}"}}'
+    triggers = {trigger["name"]: trigger for trigger in scaled["spec"]["triggers"]}
+    assert all(trigger["type"] == "metrics-api" for trigger in triggers.values()), "the broker's lists hold nothing that runs"
+    assert {name: trigger["metadata"]["valueLocation"] for name, trigger in triggers.items()} == {
+        "queued": 'fullwell_frames{state="queued"}',
+        "running": 'fullwell_frames{state="running"}',
+        "ingestions_queued": 'fullwell_ingestions{state="queued"}',
+        "ingestions_running": 'fullwell_ingestions{state="running"}',
+    }
+    assert set(scaled["spec"]["advanced"]["scalingModifiers"]["formula"].split(" + ")) == set(triggers)
 
 
 @pytest.mark.parametrize("folder", [BASE, AUTOSCALING], ids=_name)
