@@ -6,6 +6,7 @@ The rules of spacing are those of the driving-scene generators this project take
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -61,9 +62,11 @@ class StreetStyle:
     building_tag
         Only buildings with this tag, where there are any.
     layers
-        Distant vegetation: (nearest, farthest) [m] from the roads and plants per hectare.
+        Distant vegetation: (nearest, farthest) [m] from the roads and plants per hectare, in woods and clearings.
     gardens
-        Bushes and grass patches per 100 m of building front.
+        Bushes, hedges and grass patches per 100 m of building front.
+    season
+        Which trees and bushes are drawn: "summer", "autumn" or "winter". Evergreens are at all times.
     surfaces
         Materials of road, pavement and ground.
     """
@@ -80,6 +83,7 @@ class StreetStyle:
     building_tag: str = ""
     layers: tuple[tuple[float, float, float], ...] = ()
     gardens: float = 0.0
+    season: str = "summer"
     surfaces: RoadStyle = field(default_factory=RoadStyle)
 
 
@@ -93,7 +97,7 @@ STYLES: Final[Mapping[str, StreetStyle]] = MappingProxyType(
             },
             parking_share=0.75,
             building_tag="city",
-            layers=((60.0, 250.0, 2.0),),
+            layers=((60.0, 300.0, 8.0),),
             surfaces=RoadStyle(ground="concrete/grey"),
         ),
         "suburb": StreetStyle(
@@ -105,7 +109,7 @@ STYLES: Final[Mapping[str, StreetStyle]] = MappingProxyType(
             building_gap_m=4.0,
             building_share=0.9,
             building_tag="suburb",
-            layers=((15.0, 60.0, 8.0), (60.0, 250.0, 2.0)),
+            layers=((15.0, 60.0, 10.0), (60.0, 140.0, 12.0), (140.0, 300.0, 24.0)),
             gardens=9.0,
         ),
         "rural": StreetStyle(
@@ -115,15 +119,15 @@ STYLES: Final[Mapping[str, StreetStyle]] = MappingProxyType(
             building_gap_m=40.0,
             building_share=0.25,
             building_tag="suburb",
-            layers=((5.0, 40.0, 14.0), (40.0, 120.0, 7.0), (120.0, 300.0, 2.0)),
+            layers=((5.0, 40.0, 14.0), (40.0, 140.0, 12.0), (140.0, 320.0, 30.0)),
             gardens=4.0,
-            surfaces=RoadStyle(edge_lines=True, zebra=False),
+            surfaces=RoadStyle(edge_lines=True, zebra=False, covers=False, fields=60),
         ),
         "motorway": StreetStyle(
             light_m=0.0,
             building_share=0.0,
-            layers=((12.0, 40.0, 14.0), (40.0, 120.0, 7.0), (120.0, 300.0, 2.0)),
-            surfaces=RoadStyle(edge_lines=True, zebra=False, road="asphalt/new"),
+            layers=((12.0, 40.0, 14.0), (40.0, 140.0, 12.0), (140.0, 320.0, 24.0)),
+            surfaces=RoadStyle(edge_lines=True, zebra=False, road="asphalt/new", covers=False, fields=60),
         ),
     }
 )  # fmt: skip
@@ -174,10 +178,20 @@ def dress(
     lights_on
         Whether street lights and windows are lit.
     """
-    site = _Site(network, plan, style, shelf, Footprints(), seed)
+    site = _Site(network, plan, style, shelf.without(_OUT_OF_SEASON[style.season]), Footprints(), seed)
     for rule in (_signals, _signs, _street_lights, _buildings, _furniture, _trees, _parked, _gardens, _layers):
         rule(site)
     return tuple(with_lights(item) for item in site.placed) if lights_on else tuple(site.placed)
+
+
+_OUT_OF_SEASON: Final[Mapping[str, frozenset[str]]] = MappingProxyType(
+    {
+        "summer": frozenset({"autumn", "winter", "bare"}),
+        "autumn": frozenset({"summer", "winter", "bare"}),
+        "winter": frozenset({"summer", "autumn"}),
+    }
+)
+"""Tags of plants that are not drawn."""
 
 
 _LIT: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
@@ -336,7 +350,7 @@ def _trees(site: _Site) -> None:
         from_kerb_m = 0.9 if side.walk_m > 0 else 3.5
         room_m = 2 * (side.walk_m + site.style.setback_m[0] - from_kerb_m) if site.style.building_share > 0 else math.inf
         while along_m < side.whole_m - _KEEP_FREE_M:
-            asset = site.shelf.draw(rng, "tree", largest_m=(max(room_m, 3.0) + 1.5,) * 2)
+            asset = site.shelf.draw(rng, "tree", largest_m=(max(room_m, 3.0) + 1.5,) * 2, weights=_ALONG_STREETS)
             if asset is not None:
                 point, _ = side.place(along_m, from_kerb_m)
                 turn = rng.uniform(0.0, 2 * math.pi)
@@ -344,6 +358,10 @@ def _trees(site: _Site) -> None:
                 site.put(name, asset, "vegetation", point, turn, size_m=(0.7, 0.7, asset.size_m[2]))
             along_m += rng.uniform(least_m, most_m)
             number += 1
+
+
+_ALONG_STREETS: Final[Mapping[str, float]] = MappingProxyType({"street": 3.0, "conifer": 0.1, "columnar": 0.5})
+"""Chances of trees in rows by their tags, against 1."""
 
 
 def _furniture(site: _Site) -> None:
@@ -410,7 +428,9 @@ def _buildings(site: _Site) -> None:
         along_m, number = rng.uniform(0.0, 3.0), 0
         while along_m < side.whole_m:
             left_m = side.whole_m - along_m
-            asset = site.shelf.draw(rng, "building", tag=tag, largest_m=(math.inf, max(left_m + 4.0, 6.0)))
+            at_corner = number == 0 or left_m < _CORNER_M
+            largest_m = (math.inf, max(left_m + 4.0, 6.0))
+            asset = site.shelf.draw(rng, "building", tag=tag, largest_m=largest_m, weights=_AT_CORNERS if at_corner else None)
             if asset is None:
                 break
             width_m, depth_m = asset.size_m[1], asset.size_m[0]
@@ -429,8 +449,13 @@ def _buildings(site: _Site) -> None:
             number += 1
 
 
+_CORNER_M: Final = 22.0
+_AT_CORNERS: Final[Mapping[str, float]] = MappingProxyType({"corner": 5.0, "detached": 4.0, "terraced": 0.05})
+"""Chances of buildings at the ends of rows by their tags: party walls without windows are for the middle."""
+
+
 def _gardens(site: _Site) -> None:
-    """Bushes and grass between pavement and buildings."""
+    """Bushes, hedges in rows, and grass between pavement and buildings."""
     if site.style.gardens <= 0:
         return
     for side in _sides(site.network):
@@ -440,7 +465,11 @@ def _gardens(site: _Site) -> None:
             asset = site.shelf.draw(rng, kind)
             along_m = rng.uniform(2.0, max(side.whole_m - 2.0, 2.1))
             beyond_m = rng.uniform(0.8, max(site.style.setback_m[0], 1.0))
+            blocks = int(rng.integers(4, 11))
             if asset is None:
+                continue
+            if "hedge" in asset.tags:
+                _hedge_row(site, f"hedge/{side.name}/{number}", asset, side, along_m=along_m, blocks=blocks)
                 continue
             half_m = max(asset.size_m[:2]) / 2
             point, yaw = side.place(along_m, side.walk_m + half_m + beyond_m)
@@ -449,8 +478,29 @@ def _gardens(site: _Site) -> None:
                 site.put(f"{kind}/{side.name}/{number}", asset, "vegetation", point, yaw + rng.uniform(-0.2, 0.2))
 
 
+def _hedge_row(site: _Site, name: str, asset: AssetManifest, side: _Side, *, along_m: float, blocks: int) -> None:
+    """Blocks of one hedge side by side behind the pavement, as far as there is room; a row of less than three is none."""
+    depth_m, block_m = asset.size_m[0], asset.size_m[1] - _HEDGE_LAP_M
+    places = [side.place(along_m + number * block_m, side.walk_m + depth_m / 2 + 0.35) for number in range(blocks)]
+    ground = [footprint(point, yaw + math.pi / 2, (depth_m, block_m - 0.02)) for point, yaw in places]
+    row = itertools.takewhile(lambda outline: site.plan.is_free(outline) and site.taken.is_free(outline), ground)
+    fitting = len(list(row))
+    if fitting < _LEAST_HEDGE or along_m + fitting * block_m > side.whole_m:
+        return
+    for number in range(fitting):
+        point, yaw = places[number]
+        point[2] -= 0.03
+        site.taken.take(ground[number])
+        site.placed.append(PlacedAsset(f"{name}/{number}", asset, "vegetation", point, yaw + math.pi / 2))
+
+
+_HEDGE_LAP_M: Final = 0.12
+"""Leaves of one block reach so far into the next."""
+_LEAST_HEDGE: Final = 3
+
+
 def _layers(site: _Site) -> None:
-    """Plants by distance from the roads: many near, few far, none on the road."""
+    """Plants by distance from the roads, in woods and clearings, none on the road."""
     if not site.style.layers or not site.shelf.has("tree"):
         return
     roads = shapely.union_all([site.plan.carriageway, site.plan.walk])
@@ -461,9 +511,10 @@ def _layers(site: _Site) -> None:
         count = min(int(rng.poisson(per_hectare * (east - west) * (north - south) / 1e4)), _MOST_PLANTS)
         places = rng.uniform([west, south], [east, north], (count, 2))
         distances = shapely.distance(roads, shapely.points(places))
-        for number in np.flatnonzero((distances > nearest_m) & (distances <= farthest_m)):
+        wooded = rng.random(count) < 2.0 * _wooded(places, site.rng("woods").uniform(0.0, 1.0, (2, 6)))
+        for number in np.flatnonzero((distances > nearest_m) & (distances <= farthest_m) & wooded):
             kind = "tree" if rng.random() < 0.75 or not site.shelf.has("bush") else "bush"
-            asset = site.shelf.draw(rng, kind)
+            asset = site.shelf.draw(rng, kind, weights=_FREE_STANDING)
             if asset is None:
                 continue
             point = np.append(places[number], site.plan.heights.at(places[number : number + 1])[0] + KERB_HEIGHT_M - 0.03)
@@ -472,4 +523,16 @@ def _layers(site: _Site) -> None:
             site.put(name, asset, "vegetation", point, rng.uniform(0.0, 2 * math.pi), size_m=trunk)
 
 
-_MOST_PLANTS: Final = 2000
+def _wooded(places_m: Array, phases: Array) -> Array:
+    """Return (n,) the chance of a plant at places (n, 2): waves of 90 to 300 m, half of the land near 0, half near 1."""
+    waves = np.zeros(len(places_m))
+    for number, (turn, phase) in enumerate(phases.T):
+        wave_m = 90.0 + 42.0 * number
+        towards = np.array([math.cos(2 * math.pi * turn), math.sin(2 * math.pi * turn)])
+        waves += np.sin(2 * math.pi * (places_m @ towards / wave_m + phase))
+    return np.asarray(1.0 / (1.0 + np.exp(-2.2 * waves)))
+
+
+_FREE_STANDING: Final[Mapping[str, float]] = MappingProxyType({"hedge": 0.0, "street": 0.3})
+"""Chances of plants in the open by their tags: a clipped block of hedge stands in rows only."""
+_MOST_PLANTS: Final = 4000

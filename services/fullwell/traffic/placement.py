@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
@@ -21,6 +21,7 @@ Role = Literal["mover", "parked", "furniture", "light", "signal", "vegetation", 
 
 _CELL_M: Final = 12.0
 _EPSILON_M: Final = 1e-3
+_PLANTS: Final = frozenset({"tree", "bush", "grass"})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,6 +140,15 @@ class AssetShelf:
         """Return the assets of a class, with one tag and without another where they are given."""
         found = self._by_class.get(asset_class, ())
         return tuple(asset for asset in found if (not tag or tag in asset.tags) and (not without or without not in asset.tags))
+
+    def without(self, tags: Set[str]) -> AssetShelf:
+        """Return a shelf that lacks plants (trees, bushes, grass) with any of some tags; others are as they are."""
+        return AssetShelf(
+            {
+                name: [asset for asset in assets if name not in _PLANTS or not tags & set(asset.tags)]
+                for name, assets in self._by_class.items()
+            }
+        )
 
     def draw(
         self,

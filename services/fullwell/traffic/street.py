@@ -26,8 +26,9 @@ from fullwell.traffic.roads import Lane, RoadNetwork, read_network
 from fullwell.traffic.simulation import TrafficDemand, TrafficRun, VehicleModel, drive, idle_signals, simulate
 from fullwell.traffic.stops import BusStop, bus_stops, with_shelters
 from fullwell.traffic.sumo import TrafficError
-from fullwell.traffic.surfaces import KERB_HEIGHT_M, GroundPlan, RoadSurface, ground_plan, road_surfaces
+from fullwell.traffic.surfaces import KERB_HEIGHT_M, GroundPlan, RoadSurface, ground_plan, merged, road_surfaces
 from fullwell.traffic.trajectories import Mover, TrafficFrame, TrafficKind, read_fcd, read_signal_states
+from fullwell.traffic.wear import far_ground, ground_cover, road_wear
 
 Array = NDArray[np.float64]
 
@@ -80,6 +81,8 @@ class StreetSpec:
         The moments of a clip, or one.
     dressed, wet
         Whether things stand along the roads; whether the roads are wet.
+    season
+        "summer", "autumn" or "winter": which trees and bushes are drawn.
     lamps
         "day": running lights and what SUMO switches on; "night": headlights, tail lights, street lights and windows too.
     """
@@ -92,6 +95,7 @@ class StreetSpec:
     lamps: str = "day"
     dressed: bool = True
     wet: bool = False
+    season: str = "summer"
     seed: int = 0
 
 
@@ -114,7 +118,7 @@ class Street:
 
     def __init__(self, spec: StreetSpec, shelf: AssetShelf, *, path: str = "scene.traffic") -> None:
         self.spec, self._shelf, self._path = spec, shelf, path
-        self._style = street_style(spec.style, path=f"{path}.style")
+        self._style = replace(street_style(spec.style, path=f"{path}.style"), season=spec.season)
         self.network: RoadNetwork = read_network(make_network(spec.network, path=f"{path}.network"), path=f"{path}.network")
         self.plan: GroundPlan = ground_plan(self.network)
 
@@ -122,7 +126,11 @@ class Street:
     def surfaces(self) -> tuple[RoadSurface, ...]:
         """Road, pavements, markings, ground."""
         style = replace(self._style.surfaces, road="asphalt/wet") if self.spec.wet else self._style.surfaces
-        return tuple(road_surfaces(self.network, self.plan, style))
+        surfaces = [*road_surfaces(self.network, self.plan, style), far_ground(self.plan, style)]
+        if self.spec.dressed:
+            surfaces += road_wear(self.network, style, seed=self.spec.seed)
+            surfaces += ground_cover(self.plan, style, seed=self.spec.seed)
+        return tuple(merged(surfaces))
 
     @cached_property
     def standing(self) -> tuple[PlacedAsset, ...]:
@@ -161,11 +169,17 @@ class Street:
     def _models(self) -> list[VehicleModel]:
         models = []
         for kind, classes in TRAFFIC_CLASSES.items():
-            for asset in (asset for name in classes for asset in self._shelf.all(name)):
+            for asset in self._drivable(kind, classes):
                 length, width, height = asset.size_m
                 weight = 0.05 if asset.asset_class == "emergency_vehicle" else 1.0
                 models.append(VehicleModel(asset.id, kind, length, width, height, weight))
         return models
+
+    def _drivable(self, kind: TrafficKind, classes: Sequence[str]) -> list[AssetManifest]:
+        """Return the assets that may stand for a kind; of motorcycles those with riders, where there are any."""
+        found = [asset for name in classes for asset in self._shelf.all(name)]
+        ridden = [asset for asset in found if "ridden" in asset.tags]
+        return ridden if kind == "motorcycle" and ridden else found
 
     def lane(self, name: str) -> Lane | None:
         """Return a lane by its id; None where there is none, as for walkers off the lanes."""
@@ -304,7 +318,7 @@ class Street:
         return taken
 
     def _asset_of(self, mover: Mover) -> AssetManifest | None:
-        choices = [asset for name in TRAFFIC_CLASSES[mover.kind] for asset in self._shelf.all(name)]
+        choices = self._drivable(mover.kind, TRAFFIC_CLASSES[mover.kind])
         named = next((asset for asset in choices if asset.id == mover.model), None)
         if named is not None or not choices:
             return named

@@ -15,7 +15,17 @@ from scipy.spatial import cKDTree
 from fullwell.traffic.ribbons import cut, dashes, length_m, offset, ribbon
 from fullwell.traffic.roads import Lane, RoadNetwork
 
-__all__ = ["KERB_HEIGHT_M", "GroundPlan", "RoadStyle", "RoadSurface", "ground_plan", "road_surfaces"]
+__all__ = [
+    "KERB_HEIGHT_M",
+    "TERRAIN_MARGIN_M",
+    "GroundPlan",
+    "RoadStyle",
+    "RoadSurface",
+    "ground_plan",
+    "merged",
+    "road_surfaces",
+    "terrain_m",
+]
 
 Array = NDArray[np.float64]
 
@@ -34,7 +44,8 @@ _GAUGE_M: Final = 1.435
 _RAIL_HEAD_M: Final = 0.056
 """Width of the head of a grooved rail 60R2 (EN 14811); its groove is not modelled, and it lies as high as markings do."""
 _FAST_M_S: Final = 20.0
-_MARGIN_M: Final = 300.0
+TERRAIN_MARGIN_M: Final = 300.0
+"""How far the terrain reaches beyond the roads."""
 _FINE_M: Final = 4.0
 """Edges are cut to this length where the network has slopes."""
 _SMALLEST_M2: Final = 0.02
@@ -43,7 +54,8 @@ _NO_AREA_M2: Final = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class RoadStyle:
-    """What things are made of, by names of the catalogue of materials; and whether edges of roads without kerbs are marked."""
+    """What things are made of, by names of the catalogue of materials; whether edges of roads without kerbs are marked, and
+    roads have covers of manholes and gullies; how many patches of bare ground and fields are tried."""
 
     road: str = "asphalt/worn"
     walk: str = "concrete/light"
@@ -53,6 +65,9 @@ class RoadStyle:
     rail: str = "metal/steel_brushed"
     edge_lines: bool = False
     zebra: bool = True
+    covers: bool = True
+    bare_patches: int = 220
+    fields: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,7 +129,7 @@ def ground_plan(network: RoadNetwork) -> GroundPlan:
 
 
 def road_surfaces(
-    network: RoadNetwork, plan: GroundPlan, style: RoadStyle, *, margin_m: float = _MARGIN_M
+    network: RoadNetwork, plan: GroundPlan, style: RoadStyle, *, margin_m: float = TERRAIN_MARGIN_M
 ) -> list[RoadSurface]:
     """Return everything on the ground: road, sidewalk, kerb, marking, rail, and terrain to `margin_m` beyond the roads."""
     heights = plan.heights
@@ -123,23 +138,32 @@ def road_surfaces(
     )
     outer = shapely.box(*plan.carriageway.union(plan.walk).bounds).buffer(margin_m, join_style="mitre")
     ground = outer.difference(shapely.union_all([plan.carriageway, plan.walk]).buffer(0.01))
-    # Beside pavements the ground is nearly as high as they are, beside bare roads nearly as low.
-    terrain_m = KERB_HEIGHT_M - 0.03 if not plan.walk.is_empty else 0.01
+    ground_m = terrain_m(plan)
     surfaces = [
         _flat("road", style.road, plan.carriageway, heights, 0.0),
         _flat("sidewalk", style.walk, plan.walk.difference(kerb), heights, KERB_HEIGHT_M),
         _flat("kerb", style.kerb, kerb, heights, KERB_HEIGHT_M),
         _walls("kerb", style.kerb, plan.walk, heights, KERB_HEIGHT_M),
-        _flat("terrain", style.ground, ground, heights, terrain_m),
-        _walls("terrain", style.ground, ground, heights, terrain_m),
+        _flat("terrain", style.ground, ground, heights, ground_m),
+        _walls("terrain", style.ground, ground, heights, ground_m),
         _ribbons("marking", style.mark, _marks(network, style)),
         _ribbons("rail", style.rail, _rails(network)),
     ]
-    merged: dict[tuple[str, str], list[RoadSurface]] = {}
+    return merged(surfaces)
+
+
+def terrain_m(plan: GroundPlan) -> float:
+    """Return the height of the ground over the road's: beside pavements nearly theirs, beside bare roads nearly the road's."""
+    return KERB_HEIGHT_M - 0.03 if not plan.walk.is_empty else 0.01
+
+
+def merged(surfaces: Iterable[RoadSurface]) -> list[RoadSurface]:
+    """Return one surface for each class and material, in the order in which they first come; empty ones are dropped."""
+    found: dict[tuple[str, str], list[RoadSurface]] = {}
     for surface in surfaces:
         if len(surface.faces):
-            merged.setdefault((surface.name, surface.material), []).append(surface)
-    return [_joined(parts) for parts in merged.values()]
+            found.setdefault((surface.name, surface.material), []).append(surface)
+    return [_joined(parts) for parts in found.values()]
 
 
 # Regions -------------------------------------------------------------------------------------------------------------

@@ -25,6 +25,8 @@ _DUST: Final = 0.18
 """Of a vehicle's dirt: settled dust, at all heights; the rest is spray."""
 _CLEANEST: Final = 0.35
 """Of the dirtiest vehicle's dirt: what the cleanest of a street has."""
+_VEHICLE_STEPS: Final = 6
+"""Vehicles of one kind, paint and step of dirt share their triangles."""
 _BAND_M: Final = (0.18, 0.34, 0.5, 0.68, 0.9, 1.2)
 """Heights at which vehicles are cut into bands of even dirt."""
 _STEPS: Final = 24
@@ -37,8 +39,8 @@ def dirt_of_vehicle(level: float, seed: int, item_id: str) -> float:
     """Return how dirty one vehicle is in [0, 1], seeded by its id and growing with the street's level; 0 where that is 0."""
     if level <= 0:
         return 0.0
-    share = _CLEANEST + (1.0 - _CLEANEST) * float(stream(seed, "dirt", item_id).random())
-    return level * share
+    step = int(stream(seed, "dirt", item_id).integers(_VEHICLE_STEPS))
+    return level * (_CLEANEST + (1.0 - _CLEANEST) * step / (_VEHICLE_STEPS - 1))
 
 
 def by_height(mesh: Mesh, dirt: float) -> Iterator[tuple[Mesh, float]]:
@@ -71,8 +73,10 @@ def soiled(name: str, clean: Material, coverage: float, kept: _Kept, *, road: bo
     """Return a material of which dirt hides a share; `name` tells one material of the scene from others.
 
     `kept` holds the scene's materials by their text, so that equal ones are one.
-    Bodies of clear glass, mirrors and textured parts stay clean.
+    Bodies of clear glass, mirrors, textured parts and people stay clean.
     """
+    if name.startswith(("skin/", "hair/")):
+        return clean
     wiped = name.startswith(("glass/", "lamp/"))
     step = round(coverage * (_PANES if wiped else 1.0) * _STEPS)
     if step == 0:

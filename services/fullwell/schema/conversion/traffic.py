@@ -14,12 +14,14 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from fullwell.assets.classes import ASSET_CLASSES
 from fullwell.core.errors import FieldError, unknown_name_message
 from fullwell.core.hashing import digest_of
 from fullwell.scene import Emission, Light, Material, Mesh, Part, SceneObject, look_at
 from fullwell.schema.assets import candidates_of, traffic_queries
 from fullwell.schema.conversion.assets import DrawnAsset, asset_part_material, catalogue_material
 from fullwell.schema.conversion.context import Context, fail, located
+from fullwell.schema.conversion.dirt import ROAD_DIRT, by_height, dirt_of_vehicle, soiled
 from fullwell.schema.conversion.street_lamps import bright_as_its_kind, headlamp_beams, lamp_material
 from fullwell.schema.v1.cameras import MountDocument
 from fullwell.schema.v1.traffic import DemandDocument, EgoDocument, RoadNetworkDocument, TargetDocument, TrafficDocument
@@ -139,6 +141,7 @@ def _spec(document: TrafficDocument, context: Context) -> StreetSpec:
         lamps=document.lamps,
         dressed=document.dressed,
         wet=document.wet,
+        season=document.season,
         seed=context.seed,
     )
 
@@ -359,6 +362,8 @@ def street_objects(
     lights: list[Light] = []
     for surface in view.street.surfaces:
         material, _ = catalogue_material(surface.material, "scene.traffic", context)
+        share = document.dirt.roads * ROAD_DIRT.get(surface.name, 0.0)
+        material = soiled(surface.material, material, share, context.materials, road=True)
         mesh = Mesh(surface.vertices_m, surface.faces.astype(np.uint32))
         name = f"street/{surface.name}/{surface.material.replace('/', '-')}"
         objects.append(SceneObject(name, surface.name, (Part(mesh, material),), np.eye(4)))
@@ -378,9 +383,11 @@ def street_objects(
         asset = drawn[item.asset.digest, level]
         hidden = tuple(document.ego.hide) if document.ego is not None and item is view.ego else ()
         lamps = tuple(lamp_material(part.material.name, item, document, context.seed) for part in item.asset.parts)
-        key = (item.asset.digest, level, item.lit, item.paint, hidden, lamps)
+        dirt = dirt_of_vehicle(document.dirt.vehicles, context.seed, item.id) if _is_vehicle(item) else 0.0
+        key = (item.asset.digest, level, item.lit, item.paint, hidden, lamps, dirt)
         if key not in parts:
-            parts[key] = tuple(part for part in _parts(asset, item, document, context) if not _matches(part.name, hidden))
+            made = _parts(asset, item, document, context, dirt=dirt)
+            parts[key] = tuple(part for part in made if not _matches(part.name, hidden))
         if not parts[key]:
             fail("scene.traffic.ego.hide", "leaves nothing of the ego; leave out a pattern, or set show: false.")
         objects.append(SceneObject(item.id, item.asset.asset_class, parts[key], item.to_world(), (asset.licence,)))
@@ -414,7 +421,11 @@ def _drawn(item: PlacedAsset, level: int, context: Context) -> DrawnAsset:
         return DrawnAsset(item.asset, context.files.level(file, item.asset.levels[level].sha256, path="scene.traffic"))
 
 
-def _parts(asset: DrawnAsset, item: PlacedAsset, document: TrafficDocument, context: Context) -> Iterator[Part]:
+def _is_vehicle(item: PlacedAsset) -> bool:
+    return ASSET_CLASSES[item.asset.asset_class].group == "vehicle"
+
+
+def _parts(asset: DrawnAsset, item: PlacedAsset, document: TrafficDocument, context: Context, *, dirt: float) -> Iterator[Part]:
     paintable = {part.name for part in asset.manifest.parts if part.paintable}
     for loaded in asset.model.parts:
         material: Material
@@ -422,10 +433,16 @@ def _parts(asset: DrawnAsset, item: PlacedAsset, document: TrafficDocument, cont
         name = asset.record(loaded, "scene.traffic").material.name
         lamp = lamp_material(name, item, document, context.seed) if name.startswith("lamp/") else ""
         if item.paint and loaded.name in paintable:
+            name = item.paint
             material, emission = catalogue_material(item.paint, "scene.traffic", context)
         elif lamp:
             material, emission = catalogue_material(lamp, "scene.traffic", context, lit=_matches(loaded.name, item.lit))
             emission = None if emission is None else bright_as_its_kind(emission, lamp, loaded, item)
         else:
             material, emission = asset_part_material(asset, loaded, item.lit, f"scene.traffic ({item.asset.id})", context)
-        yield Part(Mesh(loaded.vertices_m, loaded.faces, loaded.normals, loaded.uv), material, np.eye(4), emission, loaded.name)
+        mesh = Mesh(loaded.vertices_m, loaded.faces, loaded.normals, loaded.uv)
+        if dirt <= 0 or emission is not None or not name:
+            yield Part(mesh, material, np.eye(4), emission, loaded.name)
+            continue
+        for band, share in by_height(mesh, dirt):
+            yield Part(band, soiled(name, material, share, context.materials), np.eye(4), None, loaded.name)

@@ -6,7 +6,19 @@ from typing import Annotated, Literal, get_args
 
 from pydantic import Field, model_validator
 
-from fullwell.schema.v1.common import Count, Document, Flag, Id, NonNegative, Number, Range, Text, exactly_one, refuse
+from fullwell.schema.v1.common import (
+    Count,
+    Document,
+    Flag,
+    Fraction,
+    Id,
+    NonNegative,
+    Number,
+    Range,
+    Text,
+    exactly_one,
+    refuse,
+)
 
 __all__ = ["DemandDocument", "EgoDocument", "KindDemandDocument", "TargetDocument", "TrafficDocument", "TrafficKindName"]
 
@@ -136,11 +148,19 @@ class TargetDocument(Document):
     facing_deg: Number = 0.0
 
 
+class DirtDocument(Document):
+    """How dirty a street is, 0 (clean) to 1: mud and dust on `vehicles`, for each by the seed; grime on `roads` and
+    pavements."""
+
+    vehicles: Fraction = 0.0
+    roads: Fraction = 0.0
+
+
 class TrafficDocument(Document):
     """A street with traffic by SUMO. `demand`, or a `run`; taken at `time_s` after the start.
 
-    `style` says how the street is dressed; `lamps` what is lit; `street_lamps` what is in street lights, each asset's own lamps
-    unless it says otherwise. Assets are the approved ones of the store unless `state` says
+    `style` says how the street is dressed, `season` with which plants; `lamps` what is lit; `street_lamps` what is in street
+    lights, each asset's own lamps unless it says otherwise. Assets are the approved ones of the store unless `state` says
     otherwise, with one of `licence` where it is given.
     """
 
@@ -157,6 +177,8 @@ class TrafficDocument(Document):
     """For which side of the road headlamps are made: their cut-off rises on it."""
 
     wet: Flag = False
+    season: Literal["summer", "autumn", "winter"] = "summer"
+    dirt: DirtDocument = Field(default_factory=DirtDocument)
     ego: EgoDocument | None = None
     targets: list[TargetDocument] = Field(default_factory=list, max_length=100)
     state: list[Literal["pending", "approved", "rejected"]] = Field(default=["approved"], min_length=1)
