@@ -182,7 +182,6 @@ def _from_file(file: Path, folder: Path, path: str, limits: SumoLimits | None) -
             "--output.street-names",
             "true",
         ]
-        read += ["--remove-edges.isolated", "true"]
     else:
         read = ["--opendrive-files", given.name, "--opendrive.curve-resolution", "1", "--opendrive.import-all-lanes", "true"]
         read += ["--opendrive.ignore-widths", "false", "--crossings.guess", "true"]

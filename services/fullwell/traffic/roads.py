@@ -109,6 +109,8 @@ class RoadNetwork:
         {edge: the edges that connections lead to}.
     classes
         {(edge, edge that follows): SUMO's classes of vehicles that may go on so}.
+    ends_m
+        (n, 2) places where the network ends: roads lead from there to one other place at most.
     """
 
     file: NetworkFile
@@ -119,6 +121,7 @@ class RoadNetwork:
     location: Mapping[str, str]
     successors: Mapping[str, tuple[str, ...]]
     classes: Mapping[tuple[str, str], frozenset[str]] = field(default_factory=dict)
+    ends_m: Array = field(default_factory=lambda: np.zeros((0, 2)))
 
     def reachable(self, edge: str, *, vclass: str = "") -> frozenset[str]:
         """Return the edges that a vehicle (of a class of SUMO's, where given) can come to from an edge, itself among them."""
@@ -172,10 +175,18 @@ def read_network(file: NetworkFile, *, path: str = "scene.traffic.network") -> R
     origin = _origin(lanes)
     if origin.any():
         lanes = [_moved_lane(lane, origin) for lane in lanes]
-        junctions = [Junction(item.id, item.kind, item.centre_m - origin, item.outline_m - origin) for item in junctions]
+        junctions = [replace(at, centre_m=at.centre_m - origin, outline_m=at.outline_m - origin) for at in junctions]
     location = {str(key): str(value) for key, value in net._location.items()}
     return RoadNetwork(
-        file, tuple(lanes), tuple(junctions), tuple(_signals(net)), origin, location, _successors(net), _classes(net)
+        file,
+        tuple(lanes),
+        tuple(junctions),
+        tuple(_signals(net)),
+        origin,
+        location,
+        successors=_successors(net),
+        classes=_classes(net),
+        ends_m=_ends(net) - origin[:2],
     )
 
 
@@ -248,6 +259,11 @@ def _junctions(net: Any) -> Iterator[Junction]:
         if len(outline) >= 3:
             x, y, *rest = node.getCoord3D()
             yield Junction(node.getID(), node.getType(), np.array([x, y, rest[0] if rest else 0.0]), outline)
+
+
+def _ends(net: Any) -> Array:
+    neighbours = ((node, {other.getID() for other in node.getNeighboringNodes()}) for node in net.getNodes())
+    return np.array([node.getCoord()[:2] for node, others in neighbours if len(others) < 2], dtype=np.float64).reshape(-1, 2)
 
 
 def _signals(net: Any) -> Iterator[SignalLink]:

@@ -368,8 +368,7 @@ class _EndChoice:
         self._network, self._walks = network, kind == "pedestrian"
         self._vclass, self._stops = _VCLASSES[kind], stops
         self._names = list(edges)
-        border = [junction.centre_m[:2] for junction in network.junctions if junction.kind == "dead_end"]
-        places = np.array(border).reshape(-1, 2)
+        places = network.ends_m
 
         def near(point: Array) -> bool:
             return len(places) > 0 and bool(np.linalg.norm(places - point[:2], axis=1).min() < _BORDER_M)

@@ -33,7 +33,7 @@ MIDDLE_M = (80.0, 80.0)
 
 def a_street(layout: str = "cross") -> Street:
     network = NetworkSpec(layout, length_m=160.0, section=SECTION)
-    demand = TrafficDemand({"car": 0.3, "pedestrian": 0.2}, {"car": 12.0})
+    demand = TrafficDemand({"car": 0.6, "pedestrian": 0.2}, {"car": 12.0})
     return Street(StreetSpec(network, demand, times_s=(30.0, 30.0 + STEP_S), seed=3), make_shelf())
 
 
