@@ -5,9 +5,12 @@ Cycles is a development tool here, no dependency: Blender is under the GPL and l
     python3.11 -m venv ~/bpy-venv && ~/bpy-venv/bin/pip install bpy==5.0.1
 
 and name its interpreter in FULLWELL_BENCH_BPY (default ~/bpy-venv/bin/python). Then
-python -m benchmarks.cycles [--scene NAME] [--size 160x120] [--samples 64] [--reference-seconds 40]
-prints for each scene the CPU-seconds that Cycles (RGB) and the path loop (31 bands, equal samples) need for the same relative
-error of the luminance.
+python -m benchmarks.cycles [--scene NAME] [--size 80x60] [--samples 256] [--seeds 3] [--reference-samples 8192]
+prints for each scene the CPU-seconds that Cycles (RGB) needs over those of the path loop (31 bands, equal samples) for the same
+relative error of the luminance, twice: without bias (nothing clamped, no glossy filter, caustics), and with samples clamped by
+both, Cycles with its glossy filter too, as Blender sets it. Each renderer is judged by its own long run with the same settings;
+what a clamped run loses is the mean of that over the mean of the one without bias. Times are those beyond a run of the fewest
+samples: no start-up, no planning.
 
 What is not the same: three colours instead of spectra, so colours of light after several bounces; the sun and sky are a sampled
 image and a disc; rough plastic and metals are Blender's Principled BSDF. Each renderer is compared with its own long run, so
@@ -21,7 +24,7 @@ import json
 import os
 import subprocess
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,11 +33,11 @@ from numpy.typing import NDArray
 
 from benchmarks.engines import Budget, Engine, Result, Stopwatch
 from benchmarks.measures import luminance, luminance_relative_mse
-from benchmarks.path_engines import OwnPath
-from benchmarks.references import extend_reference
+from benchmarks.path_engines import OwnPath, path_version, rendered, with_budget
+from benchmarks.references import extend_reference, load_reference
 from benchmarks.scenes import SCENES, build_frame
 from fullwell.radiometry import Spectrum, illuminant, normal_reflectance, tristimulus
-from fullwell.render import activate
+from fullwell.render import REPLICAS, activate
 from fullwell.scene import (
     Conductor,
     ConstantEnvironment,
@@ -64,6 +67,9 @@ _UNIT_CD_M2 = 100.0
 """Luminance of Cycles' 1.0."""
 _FIREFLIES = 0.01
 """Share of the pixels that the trimmed error leaves out."""
+_CLAMP = 10.0
+"""Times white, where samples are clamped: Blender's own setting, of which white is 1."""
+_PASS_SAMPLES = 64
 _SUN_DIAMETER_DEG = 0.5358
 _SKY_ROWS = 96
 
@@ -282,22 +288,40 @@ def _environment_rgb(described: dict[str, Any], towards: NDArray[np.float64]) ->
 
 @dataclass(eq=False)
 class CyclesEngine:
-    """Cycles in a child process. The time is that of a render of N samples less one of a single sample: no start-up."""
+    """Cycles in a child process. The time is that of a render of N samples less one of a single sample: no start-up.
+
+    `clamp_indirect_cd_m2` limits what a bounce adds to a sample's luminance, 0 for no limit; `filter_glossy` widens highlights
+    that diffuse surfaces see. Both are biased; Blender's own settings are 10 times white, and 1.
+    """
 
     light_tree: bool = True
+    clamp_indirect_cd_m2: float = 0.0
+    filter_glossy: float = 0.0
     python: str = os.environ.get("FULLWELL_BENCH_BPY") or str(Path.home() / "bpy-venv" / "bin" / "python")
 
     @property
     def name(self) -> str:
         """Name and settings."""
-        return f"cycles {'light tree' if self.light_tree else 'no light tree'}"
+        name = f"cycles {'light tree' if self.light_tree else 'no light tree'}"
+        if self.clamp_indirect_cd_m2 or self.filter_glossy:
+            name += f" clamp {self.clamp_indirect_cd_m2:.6g} filter {self.filter_glossy:g}"
+        return name
 
     def render(self, frame: FrameDescription, budget: Budget) -> Result:
         """Return the luminance [cd m^-2] of the frame's first camera, (rows, cols, 1)."""
+        return self.render_all(frame, [budget])[0]
+
+    def render_all(self, frame: FrameDescription, budgets: list[Budget]) -> list[Result]:
+        """Return what `render` does for each budget; the scene is loaded once."""
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             export_scene(frame, folder)
-            task = {"samples": budget.samples_per_pixel, "seed": budget.seed % 2**31, "light_tree": self.light_tree}
+            task = {
+                "runs": [{"samples": budget.samples_per_pixel, "seed": budget.seed % 2**31} for budget in budgets],
+                "light_tree": self.light_tree,
+                "clamp_indirect": self.clamp_indirect_cd_m2 / _UNIT_CD_M2,
+                "filter_glossy": self.filter_glossy,
+            }
             (folder / "task.json").write_text(json.dumps(task))
             watch = Stopwatch()
             command = [self.python, "-P", str(_CHILD), str(folder)]  # -P: our cycles.py must not hide Blender's own
@@ -306,38 +330,95 @@ class CyclesEngine:
             if child.returncode:
                 raise RuntimeError(f"Cycles failed: {(child.stderr or child.stdout)[-2000:]}")
             told = json.loads((folder / "told.json").read_text())
-            rgb = np.load(folder / "rgb.npy").astype(np.float64)
+            pictures = np.load(folder / "rgb.npy").astype(np.float64)
         weights = np.linalg.inv(_XYZ_TO_SRGB)[1] * _UNIT_CD_M2
-        cpu_s = told["cpu_s"] - told["one_sample_cpu_s"]
-        wall_s = told["wall_s"] - told["one_sample_wall_s"]
-        image = (rgb[..., :3] @ weights)[..., None].astype(np.float32)
-        return Result("luminance", image, cpu_s, wall_s, budget.samples_per_pixel, whole_s - told["cpu_s"])
+        setup_s = whole_s - sum(told["cpu_s"])
+        return [
+            Result(
+                "luminance",
+                (rgb[..., :3] @ weights)[..., None].astype(np.float32),
+                cpu_s - told["one_sample_cpu_s"],
+                wall_s - told["one_sample_wall_s"],
+                budget.samples_per_pixel,
+                setup_s,
+            )
+            for budget, rgb, cpu_s, wall_s in zip(budgets, pictures, told["cpu_s"], told["wall_s"], strict=True)
+        ]
 
 
-def _efficiency(engine: Engine, frame: FrameDescription, samples: int, reference_s: float) -> dict[str, Any]:
+@dataclass(eq=False)
+class ClampedPath:
+    """The path loop with equal samples and 31 bands, single samples clamped to `saturation` times what saturates a pixel."""
+
+    saturation: float
+
+    @property
+    def name(self) -> str:
+        """Name and version."""
+        return f"fullwell uniform clamp {self.saturation:g} path-{path_version()} {activate().variant()}"
+
+    def render(self, frame: FrameDescription, budget: Budget) -> Result:
+        """Return the bands."""
+        clamped = replace(frame, quality=replace(frame.quality, max_sample_saturation=self.saturation))
+        return OwnPath("uniform", skip=False, adaptive=False).render(clamped, budget)
+
+
+def _luminance(result: Result, frame: FrameDescription) -> NDArray[np.float64]:
+    if result.kind == "bands":
+        return luminance(result.image, frame.grid)
+    return np.asarray(result.image[..., 0], dtype=np.float64)
+
+
+def _saturating_cd_m2(frame: FrameDescription) -> float:
+    """Return the luminance that saturates a pixel of the sensor, at the exposure it chooses, for light like the picture's."""
+    quick = with_budget(frame, Budget(64, seed=5))
+    plan, light = rendered(quick, skip=False, seed=5)
+    (_, sensors), *_ = plan.request.targets
+    weights = dict(frame.group_weights)
+    limits = sensors.saturation(light.channels(weights))
+    seen = light.channels(weights).mean(axis=(1, 2))
+    mean = float(luminance(light.radiance(weights).photons, frame.grid).mean())
+    return mean * float(np.min(limits / seen))
+
+
+def _efficiency(engine: Engine, frame: FrameDescription, *, samples: int, seeds: int, reference_samples: int) -> dict[str, Any]:
     """Return relMSE of the luminance after `samples`, against the engine's own long run, and their product with the time."""
-    cycles = isinstance(engine, CyclesEngine)
-    # A pass of Cycles starts a process and loads the scene: few long ones.
-    per_pass = max(512 if cycles else 64, samples)
-    reference = extend_reference(frame, engine, seconds=reference_s, samples_per_pass=per_pass)
-    result = engine.render(frame, Budget(samples, seed=1234567))
-    if not cycles:  # the first call has compiled what was not in the cache of kernels
-        result = engine.render(frame, Budget(samples, seed=7654321))
-    images = [
-        luminance(image, frame.grid) if result.kind == "bands" else image[..., 0] for image in (result.image, reference.image)
-    ]
-    error = luminance_relative_mse(*images, clip_percentile=99.0)
-    usual = luminance_relative_mse(*images, clip_percentile=99.0, trimmed_fraction=_FIREFLIES)
+    budgets = [Budget(samples, seed=1234567 + seed) for seed in range(seeds)]
+    start_s = 0.0
+    if isinstance(engine, CyclesEngine):  # each call starts a process and loads the scene: one for all
+        long, *results = engine.render_all(frame, [Budget(reference_samples, seed=99), *budgets])
+        truth, known = long.image[..., 0].astype(np.float64), long.samples
+    else:
+        reference = load_reference(frame, engine, _PASS_SAMPLES)
+        while reference is None or reference.samples < reference_samples:
+            reference = extend_reference(frame, engine, seconds=10.0, samples_per_pass=_PASS_SAMPLES)
+        truth, known = luminance(reference.image, frame.grid), reference.samples
+        for count in (
+            samples,
+            REPLICAS,
+            REPLICAS,
+        ):  # the first calls compile, record and load; the last tells what set-up costs
+            start_s = engine.render(frame, Budget(count, seed=7654321)).cpu_s
+        results = [engine.render(frame, budget) for budget in budgets]
+    # The long run's error is in the difference too; both are means of samples of the same kind.
+    share = 1.0 / (1.0 + samples / known)
+    images = [_luminance(result, frame) for result in results]
+    errors, usual = (
+        [share * luminance_relative_mse(image, truth, clip_percentile=99.0, trimmed_fraction=part) for image in images]
+        for part in (0.0, _FIREFLIES)
+    )
+    time_s, error, trimmed = (float(np.mean(values)) for values in ([r.cpu_s - start_s for r in results], errors, usual))
     return {
         "engine": engine.name,
-        "samples": result.samples,
-        "reference_samples": reference.samples,
-        "cpu_s": round(result.cpu_s, 3),
+        "samples": samples,
+        "reference_samples": known,
+        "cpu_s": round(time_s, 3),
         "luminance_relmse": error,
-        "cpu_s_times_relmse": result.cpu_s * error,
-        "trimmed_relmse": usual,
-        "cpu_s_times_trimmed_relmse": result.cpu_s * usual,
-        "mean_luminance": float(images[0].mean()),
+        "relmse_of_seeds": [float(f"{value:.4g}") for value in errors],
+        "cpu_s_times_relmse": time_s * error,
+        "trimmed_relmse": trimmed,
+        "cpu_s_times_trimmed_relmse": time_s * trimmed,
+        "mean_luminance": float(truth.mean()),
     }
 
 
@@ -345,20 +426,38 @@ def main() -> None:
     """Compare both engines on the scenes asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scene", choices=sorted(SCENES), action="append")
-    parser.add_argument("--size", default="160x120")
-    parser.add_argument("--samples", type=int, default=64)
-    parser.add_argument("--reference-seconds", type=float, default=40.0)
+    parser.add_argument("--size", default="80x60")
+    parser.add_argument("--samples", type=int, default=256)
+    parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--reference-samples", type=int, default=8192)
     arguments = parser.parse_args()
     cols, rows = (int(text) for text in arguments.size.split("x"))
     for scene in arguments.scene or SCENES:
         with tempfile.TemporaryDirectory() as folder:
             frame = build_frame(scene, Path(folder), size=(cols, rows))
-        told = [
-            _efficiency(engine, frame, arguments.samples, arguments.reference_seconds)
-            for engine in (CyclesEngine(), OwnPath("uniform", skip=False, adaptive=False))
-        ]
-        ratios = {f"cpu_cycles_over_fullwell_at_equal_{e}": _ratio(told, e) for e in ("relmse", "trimmed_relmse")}
-        print(json.dumps({"scene": scene, **ratios, "cycles": told[0], "fullwell": told[1]}), flush=True)
+        white_cd_m2 = _saturating_cd_m2(frame)
+        sides: dict[str, tuple[Engine, Engine]] = {
+            "unbiased": (CyclesEngine(), OwnPath("uniform", skip=False, adaptive=False)),
+            "clamped": (CyclesEngine(clamp_indirect_cd_m2=_CLAMP * white_cd_m2, filter_glossy=1.0), ClampedPath(_CLAMP)),
+        }
+        means: dict[str, list[float]] = {}
+        for side, engines in sides.items():
+            told = [
+                _efficiency(
+                    engine,
+                    frame,
+                    samples=arguments.samples,
+                    seeds=arguments.seeds,
+                    reference_samples=arguments.reference_samples,
+                )
+                for engine in engines
+            ]
+            ratios = {f"cpu_cycles_over_fullwell_at_equal_{e}": _ratio(told, e) for e in ("relmse", "trimmed_relmse")}
+            means[side] = [row["mean_luminance"] for row in told]
+            kept = [mean / unbiased for mean, unbiased in zip(means[side], means["unbiased"], strict=True)]
+            told[0]["light_kept"], told[1]["light_kept"] = kept
+            head = {"scene": scene, "size": arguments.size, "side": side, "white_cd_m2": white_cd_m2}
+            print(json.dumps(head | ratios | {"cycles": told[0], "fullwell": told[1]}), flush=True)
 
 
 def _ratio(told: list[dict[str, Any]], error: str) -> float:

@@ -1,6 +1,7 @@
-"""Runs under Blender's Python: builds the scene that benchmarks.cycles wrote and renders it twice, with one sample and with N.
+"""Runs under Blender's Python: builds the scene that benchmarks.cycles wrote, renders one sample, then each run of the task.
 
-Arguments: the folder with scene.json, scene.npz and task.json; told.json and rgb.npy are written there.
+Arguments: the folder with scene.json, scene.npz and task.json; told.json and rgb.npy, (runs, rows, cols, channels), are written
+there.
 """
 
 from __future__ import annotations
@@ -128,14 +129,14 @@ def add_camera(described: dict[str, Any]) -> None:
 
 
 def settings(described: dict[str, Any], task: dict[str, Any], file: Path) -> None:
-    """Switch off everything that trades bias for speed."""
+    """Switch off everything that trades bias for speed, but what the task asks for."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     cycles = scene.cycles
     cycles.device, cycles.use_adaptive_sampling, cycles.use_denoising = "CPU", False, False
     cycles.use_light_tree, cycles.light_sampling_threshold = task["light_tree"], 0.0
-    cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
-    cycles.blur_glossy, cycles.caustics_reflective, cycles.caustics_refractive = 0.0, True, True
+    cycles.sample_clamp_direct, cycles.sample_clamp_indirect = 0.0, task["clamp_indirect"]
+    cycles.blur_glossy, cycles.caustics_reflective, cycles.caustics_refractive = task["filter_glossy"], True, True
     bounces = described["max_depth"] - 1
     for name in ("max_bounces", "diffuse_bounces", "glossy_bounces", "transmission_bounces", "transparent_max_bounces"):
         setattr(cycles, name, bounces)
@@ -156,6 +157,17 @@ def timed_render(samples: int, seed: int) -> tuple[float, float]:
     return time.process_time() - cpu, time.perf_counter() - wall
 
 
+def picture(file: Path) -> Any:
+    """Return the picture of a file, (rows, cols, channels) from the top."""
+    image = bpy.data.images.load(str(file))
+    image.colorspace_settings.name = "Non-Color"
+    pixels = np.empty(image.size[0] * image.size[1] * image.channels, dtype=np.float32)
+    image.pixels.foreach_get(pixels)
+    rows = pixels.reshape(image.size[1], image.size[0], image.channels)[::-1].copy()
+    bpy.data.images.remove(image)
+    return rows
+
+
 def main() -> None:
     """Build, warm up, render, tell."""
     folder = Path(sys.argv[-1])
@@ -168,17 +180,16 @@ def main() -> None:
     add_camera(document["camera"])
     file = folder / "picture.exr"
     settings(document["camera"], task, file)
-    cold_cpu, _ = timed_render(1, task["seed"])
-    one_cpu, one_wall = timed_render(1, task["seed"])
-    cpu, wall = timed_render(task["samples"], task["seed"])
-    image = bpy.data.images.load(str(file))
-    image.colorspace_settings.name = "Non-Color"
-    pixels = np.empty(image.size[0] * image.size[1] * image.channels, dtype=np.float32)
-    image.pixels.foreach_get(pixels)
-    np.save(folder / "rgb.npy", pixels.reshape(image.size[1], image.size[0], image.channels)[::-1])
+    cold_cpu, _ = timed_render(1, 0)
+    one_cpu, one_wall = timed_render(1, 0)
+    times, pictures = [], []
+    for run in task["runs"]:
+        times.append(timed_render(run["samples"], run["seed"]))
+        pictures.append(picture(file))
+    np.save(folder / "rgb.npy", np.stack(pictures))
     told = {
-        "cpu_s": cpu,
-        "wall_s": wall,
+        "cpu_s": [cpu for cpu, _ in times],
+        "wall_s": [wall for _, wall in times],
         "one_sample_cpu_s": one_cpu,
         "one_sample_wall_s": one_wall,
         "cold_cpu_s": cold_cpu,
