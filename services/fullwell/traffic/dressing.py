@@ -393,7 +393,8 @@ def _parked(site: _Site) -> None:
         for number in range(max(count, 0)):
             taken = rng.random() < site.style.parking_share
             kind = "van" if rng.random() < 0.12 else "car"
-            asset = site.shelf.draw(rng, kind, largest_m=(site.style.parking_m - 0.4, lane.width_m + 0.1))
+            room_m = (site.style.parking_m - 0.4, lane.width_m + 0.1)
+            asset = site.shelf.draw(rng, kind, largest_m=room_m) or site.shelf.draw(rng, "car", largest_m=room_m)
             along_m = _KEEP_FREE_M + (number + 0.5) * site.style.parking_m + rng.normal(0.0, 0.12)
             aside_m, turn = rng.normal(0.0, 0.06), rng.normal(0.0, 0.012)
             paint = draw_paint(rng)
@@ -425,12 +426,13 @@ def _buildings(site: _Site) -> None:
     shapely.prepare(near)
     for side in _sides(site.network):
         rng = site.rng("buildings", side.name)
-        along_m, number = rng.uniform(0.0, 3.0), 0
+        along_m, number, beside = rng.uniform(0.0, 3.0), 0, ""
         while along_m < side.whole_m:
             left_m = side.whole_m - along_m
             at_corner = number == 0 or left_m < _CORNER_M
             largest_m = (math.inf, max(left_m + 4.0, 6.0))
-            asset = site.shelf.draw(rng, "building", tag=tag, largest_m=largest_m, weights=_AT_CORNERS if at_corner else None)
+            weights = {**(_AT_CORNERS if at_corner else {}), beside: 0.0}
+            asset = site.shelf.draw(rng, "building", tag=tag, largest_m=largest_m, weights=weights)
             if asset is None:
                 break
             width_m, depth_m = asset.size_m[1], asset.size_m[0]
@@ -443,7 +445,7 @@ def _buildings(site: _Site) -> None:
                     f"building/{side.name}/{number}", asset, "building", point, yaw + math.pi / 2
                 ):
                     along_m += width_m + style.building_gap_m
-                    number += 1
+                    number, beside = number + 1, asset.id
                     continue
             along_m += 4.0 if style.building_share >= 1 else width_m / 2 + style.building_gap_m
             number += 1

@@ -88,7 +88,7 @@ def far_ground(plan: GroundPlan, style: RoadStyle) -> RoadSurface:
     ring = box.exterior if plan.heights.flat else shapely.segmentize(box, 60.0).exterior
     inner = np.asarray(shapely.orient_polygons(shapely.Polygon(ring)).exterior.coords)[:, :2]
     centre = inner[:-1].mean(axis=0)
-    outer = centre + (inner - centre) * (_HORIZON_M / np.linalg.norm(inner - centre, axis=1).min())
+    outer = centre + (inner - centre) * (_HORIZON_M / np.abs(inner - centre).max(axis=0).min())
     level = plan.heights.at(inner) + terrain_m(plan)
     vertices = np.concatenate([np.column_stack([inner, level]), np.column_stack([outer, np.full(len(outer), level.mean())])])
     here, count = np.arange(len(inner) - 1), len(inner)
