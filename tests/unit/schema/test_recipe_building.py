@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fullwell.radiometry import illuminance_lux, luminance_cd_m2, luminous_flux_lm
+from fullwell.radiometry import Spectrum, clear_sky, illuminance_lux, luminance_cd_m2, luminous_flux_lm
 from fullwell.scene import (
     ConstantEnvironment,
     Diffuse,
@@ -163,6 +163,78 @@ def test_azimuth_runs_clockwise_from_north(recipe: dict[str, Any]) -> None:
     light = _light(recipe, kind="sun_sky", sun_elevation_deg=30, sun_azimuth_deg=90)
     assert isinstance(light, SunSky)
     assert light.sun_direction == pytest.approx((math.cos(math.radians(30)), 0, 0.5), abs=ROUNDING)
+
+
+PLACE = {"latitude_deg": 48.1, "longitude_deg": 11.6}
+
+
+@pytest.mark.parametrize(
+    ("given", "lux"),
+    [
+        ({"illuminance_lux": 8000}, 8000.0),
+        ({"luminance_cd_m2": 3000}, 3000.0 * 7 * math.pi / 9),
+        ({"sun_elevation_deg": 30}, 10_800.0),
+        ({"time_utc": "2026-12-21T11:00:00Z", **PLACE}, 300.0 + 21_000.0 * math.sin(math.radians(18.4))),
+    ],
+    ids=["illuminance", "zenith", "sun", "time"],
+)
+def test_an_overcast_sky_gives_level_ground_its_illuminance(recipe: dict[str, Any], given: dict[str, Any], lux: float) -> None:
+    light = _light(recipe, kind="overcast_sky", group="sky", **given)
+    assert isinstance(light, ImageEnvironment)
+    rows = light.pixels.shape[0]
+    down = (np.arange(rows) + 0.5) * np.pi / rows
+    shares = light.pixels[:, 0, 0].astype(float)
+    zenith = luminance_cd_m2(light.radiance)
+    received = zenith * float(np.sum(shares * np.cos(down) * np.sin(down)) * np.pi / rows * 2 * np.pi)
+    assert received == pytest.approx(lux, rel=2e-3)
+    assert np.ptp(light.pixels, axis=(1, 2)).max() == 0
+    assert shares[0] == pytest.approx(1.0, abs=1e-3)
+    assert shares[rows // 2 - 1] == pytest.approx(1 / 3, abs=5e-3)
+    assert np.all(shares[rows // 2 :] == 0)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({}, "exactly one"),
+        ({"illuminance_lux": 1, "sun_elevation_deg": 3}, "exactly one"),
+        ({"time_utc": "2026-12-21T11:00:00Z"}, "all three"),
+        ({"time_utc": "2026-12-21T11:00:00Z", "illuminance_lux": 1, **PLACE}, "twice"),
+        ({"time_utc": "2026-12-21T22:00:00Z", **PLACE}, "below the horizon"),
+    ],
+)
+def test_an_overcast_sky_without_one_brightness_is_refused(recipe: dict[str, Any], given: dict[str, Any], said: str) -> None:
+    with pytest.raises(RecipeError, match=said):
+        _light(recipe, kind="overcast_sky", **given)
+
+
+def test_twilight_has_no_sun_and_gets_darker_smoothly_to_the_published_levels(recipe: dict[str, Any]) -> None:
+    """Glossary of Meteorology: 2 to 3.5 lx at the end of civil, 0.008 at that of nautical, 0.0006 of astronomical twilight."""
+    lux = []
+    elevations_deg = [0.5, 0.0, -1.0, -3.0, -6.0, -9.0, -12.0, -15.0, -18.0]
+    for elevation_deg in elevations_deg:
+        light = _light(recipe, kind="sun_sky", sun_elevation_deg=elevation_deg, sun_azimuth_deg=270, sky_weight=2.0)
+        assert isinstance(light, SunSky)
+        sky = clear_sky(light.sun_direction, turbidity=3.0, ground_albedo=0.2)
+        irradiance = 0.5 * light.sky_weight * sky.sky_irradiance()
+        lux.append(illuminance_lux(Spectrum(sky.wavelength_nm, irradiance, outside="zero")))
+        assert (light.sun_weight == 0) == (elevation_deg <= 0)
+    slopes = np.diff(np.log10(lux)) / -np.diff(elevations_deg)
+    assert np.all(slopes < 0)
+    assert np.min(slopes) > -0.8  # a factor of six a degree
+    at = dict(zip(elevations_deg, lux, strict=True))
+    assert 400 < at[0.0] < 1200
+    assert 2.0 < at[-6.0] < 3.5
+    assert at[-12.0] == pytest.approx(8e-3, rel=0.01)
+    assert at[-18.0] == pytest.approx(6e-4, rel=0.01)
+
+
+def test_twilight_by_time_and_place(recipe: dict[str, Any]) -> None:
+    light = _light(recipe, kind="sun_sky", time_utc="2026-06-21T19:40:00Z", **PLACE)
+    assert isinstance(light, SunSky)
+    assert light.sun_weight == 0
+    assert 0 < light.sky_weight < 0.3
+    assert light.sun_direction[2] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_the_sun_is_where_the_almanac_says() -> None:

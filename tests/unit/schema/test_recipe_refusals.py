@@ -140,8 +140,8 @@ CASES: list[tuple[str, Any, str, str]] = [
     (LIGHT, {"name": "s", "kind": "spot", "position_m": [0, 0, 1], "direction": [0, 0, -1], "beam_deg": 40, "cutoff_deg": 30, "intensity_w_sr_nm": 1}, "scene.lights[0].beam_deg", "must be < cutoff_deg"),
     (LIGHT, {"name": "s", "kind": "point", "position_m": [0, 0, 1], "intensity_w_sr_nm": 1, "spd": "d65"}, "scene.lights[0].spd", "holds the spectrum already"),
     (LIGHT, {"name": "s", "kind": "sun_sky"}, "scene.lights[0]", "where the sun is"),
-    (LIGHT, {"name": "s", "kind": "sun_sky", "sun_elevation_deg": -5, "sun_azimuth_deg": 0}, "scene.lights[0].sun_elevation_deg", "must be > 0"),
-    (LIGHT, {"name": "s", "kind": "sun_sky", "time_utc": "2024-06-21T00:00:00Z", "latitude_deg": 50, "longitude_deg": 0}, "scene.lights[0].time_utc", "below the horizon"),
+    (LIGHT, {"name": "s", "kind": "sun_sky", "sun_elevation_deg": -19, "sun_azimuth_deg": 0}, "scene.lights[0].sun_elevation_deg", "must be >= -18"),
+    (LIGHT, {"name": "s", "kind": "sun_sky", "time_utc": "2024-06-21T00:00:00Z", "latitude_deg": 40, "longitude_deg": 0}, "scene.lights[0].time_utc", "below the horizon"),
     (LIGHT, {"name": "s", "kind": "sun_sky", "time_utc": "noon", "latitude_deg": 50, "longitude_deg": 0}, "scene.lights[0].time_utc", "must be a time"),
     (LIGHT, {"name": "s", "kind": "image_environment", "file": "sky.exr", "radiance_w_sr_m2_nm": 1}, "scene.lights[0].file", "no folder"),
     # cameras

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 
-from fullwell.radiometry import Spectrum
+from fullwell.radiometry import Spectrum, clear_sky, illuminance_lux
+from fullwell.radiometry.overcast import (
+    DARKEST_TWILIGHT_DEG,
+    overcast_illuminance_lux,
+    overcast_shares,
+    twilight_illuminance_lux,
+)
 from fullwell.scene import (
     ConstantEnvironment,
     Diffuse,
@@ -66,6 +73,8 @@ def light_of(document: Any, path: str, context: Context) -> Light:
             return ConstantEnvironment(_sky_radiance(document, path, context), document.group)
         case documents.ImageEnvironmentLight():
             return _image(document, path, context)
+        case documents.OvercastSkyLight():
+            return _overcast(document, path, context)
         case documents.SunSkyLight():
             return _sun_sky(document, path, context)
         case _:
@@ -126,6 +135,37 @@ def _image(document: documents.ImageEnvironmentLight, path: str, context: Contex
     return ImageEnvironment(pixels, _sky_radiance(document, path, context), document.azimuth_deg, document.group)
 
 
+_OVERCAST_ROWS = 512
+
+
+def _overcast(document: documents.OvercastSkyLight, path: str, context: Context) -> ImageEnvironment:
+    if document.luminance_cd_m2 is not None:
+        zenith = luminous(document, "luminance_cd_m2", path, RADIANCE_UNIT, context)
+    else:
+        lux = document.illuminance_lux
+        if lux is None:
+            lux = overcast_illuminance_lux(_overcast_elevation_deg(document, path))
+        stated = document.model_copy(update={"illuminance_lux": lux})
+        zenith = luminous(stated, "illuminance_lux", path, RADIANCE_UNIT, context, per=7.0 * math.pi / 9.0)
+    shares = overcast_shares(_OVERCAST_ROWS).astype(np.float32)
+    pixels = np.broadcast_to(shares[:, None, None], (_OVERCAST_ROWS, 2, 3)).copy()
+    return ImageEnvironment(pixels, zenith, group=document.group)
+
+
+def _overcast_elevation_deg(document: documents.OvercastSkyLight, path: str) -> float:
+    if document.sun_elevation_deg is not None:
+        return document.sun_elevation_deg
+    elevation_deg, _ = _sun_at(document, path)
+    if elevation_deg < 0:
+        fail(
+            f"{path}.time_utc",
+            f"is {document.time_utc!r}, when the sun is {-elevation_deg:.1f} deg below the horizon; give illuminance_lux, or "
+            "take another.",
+            document.time_utc,
+        )
+    return elevation_deg
+
+
 def _sun_sky(document: documents.SunSkyLight, path: str, context: Context) -> SunSky:
     low_nm, high_nm = (float(context.grid.edges_nm[end]) for end in (0, -1))
     if low_nm < _SKY_MODEL_NM[0] or high_nm > _SKY_MODEL_NM[1]:
@@ -136,10 +176,10 @@ def _sun_sky(document: documents.SunSkyLight, path: str, context: Context) -> Su
             context.grid.step_nm,
         )
     elevation_deg, azimuth_deg = _sun_angles(document, path)
-    elevation, azimuth = math.radians(elevation_deg), math.radians(azimuth_deg)
-    sun = (math.cos(elevation) * math.sin(azimuth), math.cos(elevation) * math.cos(azimuth), math.sin(elevation))
-    return SunSky(
-        _unit(sun),
+    elevation, azimuth = math.radians(max(elevation_deg, 0.0)), math.radians(azimuth_deg)
+    sun = _unit((math.cos(elevation) * math.sin(azimuth), math.cos(elevation) * math.cos(azimuth), math.sin(elevation)))
+    light = SunSky(
+        sun,
         document.turbidity,
         document.ground_albedo,
         document.sun_weight,
@@ -147,22 +187,37 @@ def _sun_sky(document: documents.SunSkyLight, path: str, context: Context) -> Su
         group=document.group,
         sun_group=document.sun_group or "",
     )
+    return light if elevation_deg > 0 else _twilight(light, elevation_deg)
+
+
+def _twilight(light: SunSky, elevation_deg: float) -> SunSky:
+    """Return the sky of a sun on the horizon, as bright as it is with the sun below it, and no sun."""
+    sky = clear_sky(light.sun_direction, turbidity=light.turbidity, ground_albedo=light.ground_albedo)
+    sunset_lux = illuminance_lux(Spectrum(sky.wavelength_nm, sky.sky_irradiance(), outside="zero"))
+    left = twilight_illuminance_lux(elevation_deg, at_sunset_lux=sunset_lux) / sunset_lux
+    return replace(light, sun_weight=0.0, sky_weight=light.sky_weight * left)
 
 
 def _sun_angles(document: documents.SunSkyLight, path: str) -> tuple[float, float]:
     if document.sun_elevation_deg is not None and document.sun_azimuth_deg is not None:
         return document.sun_elevation_deg, document.sun_azimuth_deg
+    elevation_deg, azimuth_deg = _sun_at(document, path)
+    if elevation_deg < DARKEST_TWILIGHT_DEG:
+        fail(
+            f"{path}.time_utc",
+            f"is {document.time_utc!r}, when the sun is {-elevation_deg:.1f} deg below the horizon: night, from "
+            f"{-DARKEST_TWILIGHT_DEG:g} deg on. Take another, or leave the light out.",
+            document.time_utc,
+        )
+    return elevation_deg, azimuth_deg
+
+
+def _sun_at(document: documents.SunSkyLight | documents.OvercastSkyLight, path: str) -> tuple[float, float]:
+    """Return elevation and azimuth [deg] of the sun at a document's time and place."""
     text = str(document.time_utc)
     try:
         time = datetime.fromisoformat(text)
     except ValueError:
         fail(f"{path}.time_utc", f"is {text!r}; must be a time such as 2024-06-21T10:30:00Z.", text)
     time = time.replace(tzinfo=UTC) if time.tzinfo is None else time
-    elevation_deg, azimuth_deg = sun_angles_deg(
-        time, latitude_deg=document.latitude_deg or 0.0, longitude_deg=document.longitude_deg or 0.0
-    )
-    if elevation_deg <= 0:
-        fail(
-            f"{path}.time_utc", f"is {text!r}, when the sun is {-elevation_deg:.1f} deg below the horizon; take another.", text
-        )
-    return elevation_deg, azimuth_deg
+    return sun_angles_deg(time, latitude_deg=document.latitude_deg or 0.0, longitude_deg=document.longitude_deg or 0.0)

@@ -105,7 +105,7 @@ def _fog(document: FogDocument | None) -> Fog | None:
 
 
 def _check_not_empty(document: SceneDocument) -> None:
-    environments = ("constant_environment", "image_environment", "sun_sky", "area")
+    environments = ("constant_environment", "image_environment", "overcast_sky", "sun_sky", "area")
     if not document.objects and document.traffic is None and not any(light.kind in environments for light in document.lights):
         fail("scene.objects", "is empty and there is no environment light: nothing can be seen. Add an object or a sky.")
 

@@ -31,6 +31,7 @@ __all__ = [
     "DirectionalLightDocument",
     "ImageEnvironmentLight",
     "LightDocument",
+    "OvercastSkyLight",
     "PointLightDocument",
     "SpotLightDocument",
     "SunSkyLight",
@@ -153,20 +154,53 @@ class ImageEnvironmentLight(_Light):
         return self
 
 
-class SunSkyLight(_Light):
+class _PlacedSun(_Light):
+    """Where the sun is: by angles, or by time and place."""
+
+    sun_elevation_deg: Annotated[float, Range(ge=-18, le=90)] | None = None
+    time_utc: Text | None = None
+    latitude_deg: Annotated[float, Range(ge=-90, le=90)] | None = None
+    longitude_deg: Annotated[float, Range(ge=-180, le=180)] | None = None
+
+
+class OvercastSkyLight(_PlacedSun):
+    """The CIE's overcast sky: luminance (1 + 2 sin elevation) / 3 of that of the zenith, all around alike, no sun.
+
+    As bright as `illuminance_lux` (of unshaded level ground) or `luminance_cd_m2` (of the zenith) says; or as overcast skies
+    are on average with the sun at `sun_elevation_deg`, or where it is at `time_utc`, `latitude_deg` and `longitude_deg`.
+    """
+
+    kind: Literal["overcast_sky"]
+    sun_elevation_deg: Annotated[float, Range(ge=0, le=90)] | None = None
+    illuminance_lux: NonNegative | None = None
+    luminance_cd_m2: NonNegative | None = None
+    spd: Spd = "D65"
+
+    @model_validator(mode="after")
+    def _one_brightness(self) -> OvercastSkyLight:
+        place = [self.time_utc, self.latitude_deg, self.longitude_deg]
+        if any(value is not None for value in place):
+            if None in place:
+                refuse("gives a part of time_utc, latitude_deg and longitude_deg; give all three.")
+            given = [self.illuminance_lux, self.luminance_cd_m2, self.sun_elevation_deg]
+            if any(value is not None for value in given):
+                refuse("says how bright it is twice; give a time and place, or one quantity.")
+            return self
+        exactly_one(self, "illuminance_lux", "luminance_cd_m2", "sun_elevation_deg")
+        return self
+
+
+class SunSkyLight(_PlacedSun):
     """Sun and clear sky in absolute units (x = east, y = north, z = up).
 
     The sun's place is either given by elevation and azimuth (clockwise from north) or computed from `time_utc`
-    ("2024-06-21T10:30:00Z"), `latitude_deg` and `longitude_deg` (east positive). `sun_group` is the light group of the sun's
+    ("2024-06-21T10:30:00Z"), `latitude_deg` and `longitude_deg` (east positive). From the horizon down to -18 degrees the sky
+    is that of twilight, without a sun. `sun_group` is the light group of the sun's
     disk, where it is not that of the sky.
     """
 
     kind: Literal["sun_sky"]
-    sun_elevation_deg: Annotated[float, Range(gt=0, le=90)] | None = None
     sun_azimuth_deg: Number | None = None
-    time_utc: Text | None = None
-    latitude_deg: Annotated[float, Range(ge=-90, le=90)] | None = None
-    longitude_deg: Annotated[float, Range(ge=-180, le=180)] | None = None
     turbidity: Annotated[float, Range(ge=1, le=10)] = 3.0
     ground_albedo: Fraction = 0.2
     sun_group: Group | None = None
@@ -192,6 +226,7 @@ LightDocument = Annotated[
     | DirectionalLightDocument
     | ConstantEnvironmentLight
     | ImageEnvironmentLight
+    | OvercastSkyLight
     | SunSkyLight,
     Field(discriminator="kind"),
 ]
