@@ -29,7 +29,7 @@ _SAFETY = 1.05
 _AROUND = 5
 """Side of a tile's surroundings, in tiles."""
 
-_PRIOR_SAMPLES = 128
+_PRIOR_SAMPLES = 64
 """Samples per pixel at which a tile's own variance counts as much as that of its surroundings."""
 
 
@@ -240,20 +240,15 @@ def _cautious(ratio: NDArray[np.float64], samples: NDArray[np.int64]) -> NDArray
     """Return the error over noise by which tiles are judged: their own, or with few samples that of their surroundings too.
 
     Where rare paths are bright, a tile that has met none yet looks exact. Variances for one sample, in units of the sensor's
-    noise, are averaged with those of the tiles around, each by its number of samples, half and half at `_PRIOR_SAMPLES`; from
-    four times that on a tile stands for itself, however bright its neighbour.
+    noise, are averaged with those of the tiles around, half and half at `_PRIOR_SAMPLES`; from four
+    times that on a tile stands for itself, however bright its neighbour.
     """
     for_one = np.where(np.isfinite(ratio), ratio, 0.0) ** 2 * samples
     # Running sums may fall below zero by rounding.
-    around = np.maximum(_around(for_one * samples) / _around(np.maximum(samples, 1)), 0.0)
+    around = np.maximum(uniform_filter(for_one, size=_AROUND, mode="nearest"), 0.0)
     own = np.where(samples < 4 * _PRIOR_SAMPLES, samples**2 / (samples**2 + _PRIOR_SAMPLES**2), 1.0)
     together = (own * for_one + (1.0 - own) * around) / np.maximum(samples, 1)
     return np.asarray(np.maximum(ratio, np.sqrt(together)))
-
-
-def _around(values: NDArray[np.generic]) -> NDArray[np.float64]:
-    """Return the mean over each tile's surroundings, itself included."""
-    return np.asarray(uniform_filter(values.astype(np.float64), size=_AROUND, mode="nearest"))
 
 
 def _more_samples(ratio: NDArray[np.float64], so_far: NDArray[np.int64], wanted: float, cap: int) -> NDArray[np.int64]:
