@@ -176,11 +176,11 @@ def with_cache_steps(plan: FramePlan, frame: FrameDescription, stages: StageStor
     if not plan.radiance:
         return plan
     steps = []
-    for rig, light in zip(frame.cameras, plan.lights, strict=True):
-        key = stored_light_key(light_key(frame, rig, light, variant=choose_variant().variant))
+    for lit in plan.lights:
+        key = stored_light_key(light_key(frame, lit.rig, lit.plan, variant=choose_variant().variant))
         kept, address = stages.has(KIND, key), stages.address(KIND, key)
         why = f"kept as {address}: not rendered again" if kept else f"not kept yet; will be kept as {address}"
-        steps.append(PlanStep(f"{rig.camera.name}: stage cache", "skip" if kept else "run", why))
+        steps.append(PlanStep(f"{lit.rig.camera.name}: stage cache", "skip" if kept else "run", why))
     return replace(plan, steps=(*plan.steps, *steps))
 
 

@@ -192,15 +192,21 @@ def _camera_products(run: _Run, rig: CameraRig, position: int) -> None:
         "camera_to_world": rig.camera.camera_to_world.tolist(),
         "sensors": [],
     }
-    images: _Images | None = None
-    if plan.radiance:
-        images = _rendered(run, rig, plan.lights[position], folder, (base, share * _RENDER_SHARE))
-        document["radiance"] = _radiance_document(images, frame)
+    by_sensor: dict[str, _Images] = {}
+    lights = [lit for lit in plan.lights if lit.position == position]
+    for number, lit in enumerate(lights):
+        part = share * _RENDER_SHARE / len(lights)
+        inner = folder if len(lights) == 1 else f"{folder}{lit.rig.sensors[0].name}/"
+        images = _rendered(run, lit.rig, lit.plan, inner, (base + number * part, part))
+        by_sensor |= {sensor.name: images for sensor in lit.rig.sensors}
+        document.setdefault("radiance", _radiance_document(images, frame))
     for number, sensor in enumerate(rig.sensors):
         part = (number + 0.5) / len(rig.sensors)
         run.report("sensor and labels", base + share * (_RENDER_SHARE + (1 - _RENDER_SHARE) * part))
         inner = f"{folder}{sensor.name}/" if len(rig.sensors) > 1 else folder
-        document["sensors"].append(_sensor_products(run, rig, sensor, inner, images))
+        document["sensors"].append(_sensor_products(run, rig, sensor, inner, by_sensor.get(sensor.name)))
+        if len(lights) > 1:
+            document["sensors"][-1]["radiance"] = _radiance_document(by_sensor[sensor.name], frame)
     run.cameras.append(document)
 
 

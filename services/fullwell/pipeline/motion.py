@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from fullwell.sensor.exposure import base_exposure
 from fullwell.sensor.exposures import AutoExposure, FixedExposure
 from fullwell.sensor.rolling_shutter import readout_duration_s
 
-__all__ = ["MotionPlan", "Shifts", "Timing", "plan_motion"]
+__all__ = ["MotionPlan", "Shifts", "Timing", "plan_motion", "rigs_by_exposure"]
 
 Array = NDArray[np.float64]
 
@@ -293,14 +293,39 @@ class MotionPlan:
         )
 
 
+def rigs_by_exposure(frame: FrameDescription, rig: CameraRig, *, skip: bool = True) -> tuple[CameraRig, ...]:
+    """Return the rig, or where something moves one for all its sensors that are exposed at the same times."""
+    by_timing: dict[Timing, list[SensorRig]] = {}
+    for sensor in rig.sensors:
+        by_timing.setdefault(Timing.of(sensor), []).append(sensor)
+    if len(by_timing) == 1 or not _plan(frame, rig, skip=skip).runs:
+        return (rig,)
+    return tuple(replace(rig, sensors=tuple(sensors)) for sensors in by_timing.values())
+
+
 def plan_motion(frame: FrameDescription, rig: CameraRig, position: int, *, skip: bool = True) -> MotionPlan:
     """Return what is to be rendered moving for the camera at `position`; with `skip` false all that moves at all.
 
     Raises
     ------
     FieldError
-        Something moves, and the camera's sensors are exposed at different times.
+        Something moves, and the camera's sensors are exposed at different times: see `rigs_by_exposure`.
     """
+    plan = _plan(frame, rig, skip=skip)
+    timings = {Timing.of(sensor) for sensor in rig.sensors}
+    if plan.runs and len(timings) > 1:
+        path = f"cameras[{position}].sensors"
+        names = [sensor.name for sensor in rig.sensors]
+        raise FieldError(
+            f"{path} are {', '.join(names)}, which are exposed at different times while something moves: they do not see the "
+            "same light. Plan each by itself.",
+            path=path,
+            value=names,
+        )
+    return plan
+
+
+def _plan(frame: FrameDescription, rig: CameraRig, *, skip: bool) -> MotionPlan:
     what = f"{rig.camera.name}: motion"
     moving = {name: motion for name, motion in frame.motions.items() if motion.moves and _takes_part(name, frame.scene)}
     if not moving and not rig.motion.moves:
@@ -313,11 +338,13 @@ def plan_motion(frame: FrameDescription, rig: CameraRig, position: int, *, skip:
     if largest_px <= least_px:
         why = f"nothing moves by more than {largest_px:.2g} px within the {_duration(window_s)} of the exposure"
         return MotionPlan(PlanStep(what, "skip", why, f"{largest_px:.2g} px"))
-    _check_same_timing(timings, rig, position, least_px)
     most = _most_moments(frame.scene, chosen)
     subject = [f"{len(chosen)} object{'s' * (len(chosen) > 1)}"] if chosen else []
     subject += ["the camera"] if rig.motion.moves else []
-    step = _step(what, " and ".join(subject), timings[0], shifts, least_px=least_px, most=most)
+    told = " and ".join(subject)
+    if len(frame.cameras) > 0 and not any(rig.sensors == whole.sensors for whole in frame.cameras):
+        told = f"for {', '.join(sensor.name for sensor in rig.sensors)}: {told}"
+    step = _step(what, told, timings[0], shifts, least_px=least_px, most=most)
     return MotionPlan(step, timings[0], chosen, rig.motion, shifts, least_px, most)
 
 
@@ -351,18 +378,6 @@ def _moving_shifts(
     carriers = {name: motion for name, motion in moving.items() if name not in ids}
     still_px = float(alone_px[~far_enough].max(initial=0.0))
     return shifts, chosen | (carriers if rig.motion.moves or chosen else {}), still_px
-
-
-def _check_same_timing(timings: list[Timing], rig: CameraRig, position: int, least_px: float) -> None:
-    if len(set(timings)) > 1:
-        names = ", ".join(repr(sensor.name) for sensor in rig.sensors)
-        raise FieldError(
-            f"cameras[{position}].sensors are {names}, which are exposed at different times while something moves: they do "
-            "not see the same light. Give each a camera of its own, the same exposure and readout, or raise "
-            f"quality.motion_blur_px, which is {least_px:g}.",
-            path=f"cameras[{position}].sensors",
-            value=[sensor.name for sensor in rig.sensors],
-        )
 
 
 def _most_moments(scene: SceneDescription, chosen: Mapping[str, Motion]) -> int:

@@ -7,10 +7,11 @@ from typing import Any
 
 from fullwell.optics import MAX_SKIPPED_CONTRAST_LOSS, nyquist_contrast_loss, working_f_number
 from fullwell.pipeline.lighting import LightPlan, plan_light
+from fullwell.pipeline.motion import rigs_by_exposure
 from fullwell.pipeline.steps import PlanStep
 from fullwell.schema.frame import CameraRig, FrameDescription
 
-__all__ = ["FramePlan", "PlanStep", "plan_document", "plan_frame"]
+__all__ = ["FramePlan", "LitRig", "PlanStep", "plan_document", "plan_frame"]
 
 _DISPLAY = frozenset({"image.png"})
 _SENSOR = _DISPLAY | {"raw.npz", "raw.tiff", "raw.dng"}
@@ -31,6 +32,15 @@ _LABELS = frozenset(
 
 
 @dataclass(frozen=True, slots=True)
+class LitRig:
+    """What is rendered for the camera at `position`: for all sensors of it that see the same light."""
+
+    position: int
+    rig: CameraRig
+    plan: LightPlan
+
+
+@dataclass(frozen=True, slots=True)
 class FramePlan:
     """The decisions of a frame, and the switches that the runner follows."""
 
@@ -40,8 +50,8 @@ class FramePlan:
     sensor: bool
     display: bool
     labels: bool
-    lights: tuple[LightPlan, ...] = ()
-    """What is rendered for each camera; empty where nothing is."""
+    lights: tuple[LitRig, ...] = ()
+    """What is rendered, camera by camera; empty where nothing is."""
     skips: bool = True
     """Whether the optics may leave out what they can bound."""
 
@@ -64,11 +74,12 @@ def plan_frame(frame: FrameDescription, *, skip: bool = True) -> FramePlan:
             steps.append(PlanStep(name, "run", f"for {', '.join(needed)}"))
         else:
             steps.append(PlanStep(name, "skip", "no output asks for it"))
-    lights = []
+    lights: list[LitRig] = []
     for position, rig in enumerate(frame.cameras):
         if switches["radiance"]:
-            lights.append(plan_light(frame, rig, position, skip=skip))
-            steps.extend(lights[-1].steps)
+            for part in rigs_by_exposure(frame, rig, skip=skip):
+                lights.append(LitRig(position, part, plan_light(frame, part, position, skip=skip)))
+                steps.extend(lights[-1].plan.steps)
         steps.extend(_camera_steps(frame, rig, switches["radiance"], switches["optics"], skip=skip))
     return FramePlan(steps=tuple(steps), lights=tuple(lights), skips=skip, **switches)
 
