@@ -37,8 +37,9 @@ RECIPE: dict[str, Any] = {
         "lights": [
             {
                 "kind": "sun_sky",
-                "name": "sky",
+                "name": "daylight",
                 "group": "sky",
+                "sun_group": "sun",
                 "time_utc": "2026-06-21T13:30:00Z",
                 "latitude_deg": 48.1,
                 "longitude_deg": 11.6,

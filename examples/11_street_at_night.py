@@ -1,4 +1,4 @@
-"""Day, dusk and night from one rendering, written in Python: the same bytes as 11_street_at_night.yaml.
+"""Day, a dull day, dusk and night from one rendering, written in Python: the same bytes as 11_street_at_night.yaml.
 
 Draws from this machine's asset store; take the starter library in first: fullwell assets starter --approve
 Run: python examples/11_street_at_night.py, then fullwell show out/11-street-at-night
@@ -38,8 +38,9 @@ RECIPE: dict[str, Any] = {
         "lights": [
             {
                 "kind": "sun_sky",
-                "name": "sky",
+                "name": "daylight",
                 "group": "sky",
+                "sun_group": "sun",
                 "time_utc": "2026-06-21T13:30:00Z",
                 "latitude_deg": 48.1,
                 "longitude_deg": 11.6,
@@ -65,9 +66,10 @@ RECIPE: dict[str, Any] = {
     "vary": {
         "grid": {
             "scene.light_groups": [
-                {"sky": 1, "headlights": 1, "streetlights": 1, "other": 1},
-                {"sky": 0.002, "headlights": 1, "streetlights": 1, "other": 1},
-                {"sky": 1e-05, "headlights": 1, "streetlights": 1, "other": 1},
+                {"sun": 1, "sky": 1, "headlights": 1, "streetlights": 1, "other": 1},
+                {"sun": 0, "sky": 0.3, "headlights": 1, "streetlights": 1, "other": 1},
+                {"sun": 0, "sky": 0.002, "headlights": 1, "streetlights": 1, "other": 1},
+                {"sun": 0, "sky": 1e-05, "headlights": 1, "streetlights": 1, "other": 1},
             ]
         }
     },

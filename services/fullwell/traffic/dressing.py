@@ -261,7 +261,10 @@ def _street_lights(site: _Site) -> None:
     if site.style.light_m <= 0 or not site.shelf.has("street_light"):
         return
     rng = site.rng("lights")
-    kind = site.shelf.draw(rng, "street_light", tag=site.style.light_tag) or site.shelf.draw(rng, "street_light")
+    spacing_m = site.style.light_m
+    too_low = {light.id: 0.0 for light in site.shelf.all("street_light") if light.size_m[2] * _SPACING_PER_HEIGHT < spacing_m}
+    kind = site.shelf.draw(rng, "street_light", tag=site.style.light_tag, weights=too_low)
+    kind = kind or site.shelf.draw(rng, "street_light")
     assert kind is not None
     for side in _sides(site.network):
         count = max(1, round((side.whole_m - 2 * _KEEP_FREE_M) / site.style.light_m)) if side.whole_m > 2 * _KEEP_FREE_M else 0
@@ -273,6 +276,9 @@ def _street_lights(site: _Site) -> None:
                 turn = yaw + math.pi / 2
                 site.placed.append(PlacedAsset(name, kind, "light", pivot_of_pole(kind, base, turn), turn))
 
+
+_SPACING_PER_HEIGHT: Final = 4.2
+"""Street lights farther apart than this times their height leave the road dark between them; lanterns are for paths."""
 
 _POLE_M: Final = (0.4, 0.4)
 """What lights, signals and signs take of the ground."""

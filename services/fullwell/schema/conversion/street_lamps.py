@@ -49,6 +49,9 @@ _HALOGEN_SHARE: Final = 0.4
 _STREET_LAMPS: Final[Mapping[str, str]] = MappingProxyType(
     {"led": "street_led", "sodium": "street_hps", "mercury": "street_mercury", "metal_halide": "street_mh"}
 )
+_OUTPUT_RATIO: Final = 0.75
+"""Share of a discharge lamp's flux that leaves its luminaire; fluxes of LED luminaires are what leaves them."""
+
 _LARGEST_CHANGE: Final = 8.0
 """By which a part's luminance is at most corrected: lenses that are seen edge on from ahead stay believable from aside."""
 
@@ -69,9 +72,12 @@ def lamp_material(name: str, item: PlacedAsset, document: TrafficDocument, seed:
 def bright_as_its_kind(emission: Emission, lamp: str, part: LoadedPart, item: PlacedAsset) -> Emission:
     """Return a part's light with the intensity that its kind has at least and at most, or the flux that its asset states.
 
+    Street lights send theirs along the road and over it (`traffic.luminaires`).
+
     The same for all levels of detail: it is the lamp's, and not that of a mesh's area.
     """
     from fullwell.assets.materials.catalogue import asset_material  # noqa: PLC0415 - its tables are read when they are needed
+    from fullwell.traffic.luminaires import luminaire_pattern  # noqa: PLC0415 - SUMO is an extra
 
     entry = asset_material(lamp).lamp
     if entry is None:
@@ -80,7 +86,8 @@ def bright_as_its_kind(emission: Emission, lamp: str, part: LoadedPart, item: Pl
     areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
     luminance = entry.luminance_cd_m2
     if item.role == "light" and "luminous_flux_lm" in item.asset.attributes:
-        given = float(item.asset.attributes["luminous_flux_lm"]) / (np.pi * float(np.linalg.norm(areas, axis=1).sum()))
+        flux = float(item.asset.attributes["luminous_flux_lm"]) * (1.0 if lamp == "lamp/street_led" else _OUTPUT_RATIO)
+        given = flux / (np.pi * float(np.linalg.norm(areas, axis=1).sum()))
     else:
         limits = next((limits for start, limits in INTENSITY_CD.items() if part.name.startswith(start)), None)
         ahead = max(float(np.maximum(areas[:, 0], 0).sum()), float(np.maximum(-areas[:, 0], 0).sum()))
@@ -88,7 +95,8 @@ def bright_as_its_kind(emission: Emission, lamp: str, part: LoadedPart, item: Pl
             return emission
         given = float(np.clip(luminance * ahead, *limits)) / ahead
     change = float(np.clip(given / luminance, 1 / _LARGEST_CHANGE, _LARGEST_CHANGE))
-    return emission if change == 1.0 else Emission(emission.radiance.scaled(change), emission.group)
+    pattern = luminaire_pattern(corners) if lamp.startswith("lamp/street_") else None
+    return Emission(emission.radiance.scaled(change), emission.group, pattern)
 
 
 def headlamp_beams(document: TrafficDocument, item: PlacedAsset, asset: DrawnAsset, seed: int) -> Iterator[GoniometricLight]:
