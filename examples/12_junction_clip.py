@@ -42,7 +42,7 @@ RECIPE: dict[str, Any] = {
             "sensors": [{"name": "main", "model": "ar0132at-rgb", "rows": 180, "cols": 320, "exposure": {"auto": {}}}],
         }
     ],
-    "vary": {"grid": {"scene.traffic.time_s": [40, 40.5, 41, 41.5, 42, 42.5, 43, 43.5]}},
+    "vary": {"clip": {"frames": 8, "frame_rate_hz": 2}},
     "outputs": ["image.png", "instances.png", "labels.json"],
     "quality": {"noise_ratio": 1.5, "max_samples_per_pixel": 64, "max_depth": 4},
 }
