@@ -124,7 +124,11 @@ def ground_plan(network: RoadNetwork) -> GroundPlan:
     # Where nobody may cross, SUMO's walking areas go on over the road.
     ways = [*driven, *(_strip(lane) for lane in network.of_kind("internal"))]
     walk = _closed(shapely.union_all(walked)).difference(shapely.union_all([crossings, *ways]))
-    carriageway = _closed(shapely.union_all([*driven, *junctions, crossings])).difference(walk)
+    carriageway = _closed(shapely.union_all([*driven, *junctions, crossings]), _NOTCH_M).difference(walk)
+    both = shapely.union_all([carriageway, walk])
+    holes = shapely.get_parts(_closed(both, _NOTCH_M).difference(both))
+    corners = [hole for hole in holes if hole.area < _SMALL_HOLE_M2 and hole.distance(walk) < _SMALLEST_M2]
+    walk = shapely.union_all([walk, *corners]) if corners else walk
     return GroundPlan(carriageway, walk, crossings, _Heights(network))
 
 
@@ -176,9 +180,15 @@ def _strip(lane: Lane) -> Any:
     )
 
 
-def _closed(region: Any) -> Any:
-    """Return a region without the slivers that rounding leaves between neighbours."""
-    return region.buffer(0.05, join_style="mitre").buffer(-0.05, join_style="mitre")
+_SMALL_HOLE_M2: Final = 1.5
+"""Ground between a pavement's end and the road that is smaller than this is paved too."""
+_NOTCH_M: Final = 0.8
+"""Wedges that SUMO leaves between the edges of junctions and of lanes that bend away are paved: up to twice this wide."""
+
+
+def _closed(region: Any, reach_m: float = 0.05) -> Any:
+    """Return a region without the slivers between neighbours, up to twice `reach_m` wide."""
+    return region.buffer(reach_m, join_style="mitre").buffer(-reach_m, join_style="mitre")
 
 
 def _polygons(region: Any) -> Iterator[Any]:
