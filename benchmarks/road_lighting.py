@@ -24,6 +24,8 @@ from fullwell.scene import BeamPattern, Camera, Film, Lens, Mesh, SceneDescripti
 from fullwell.scene.groups import only_groups
 from fullwell.schema import RecipeBuilder, load_recipe
 from fullwell.schema.assets import StoredAssetFiles
+from fullwell.schema.conversion.street_lamps import INTENSITY_CD
+from fullwell.traffic.headlamps import beam_intensity_cd, beam_patterns
 
 CLASSES = {"M1": 2.0, "M2": 1.5, "M3": 1.0, "M4": 0.75, "M5": 0.5, "M6": 0.3}
 """Least mean luminance [cd m^-2] of a dry road by EN 13201-2."""
@@ -187,8 +189,52 @@ def _illuminance_lux(lamps: list[_Lamp], point: tuple[float, float, float]) -> f
     return total
 
 
-CASES = [("city", "asset", seed) for seed in range(1, 7)] + [("suburb", "asset", seed) for seed in range(1, 5)]
-CASES += [("city", lamps, 2) for lamps in ("sodium", "mercury", "metal_halide")]
+CASES = [(style, "asset", seed) for style in ("city", "suburb") for seed in (1, 2, 3)]
+CASES += [("city", lamps, 2) for lamps in ("sodium", "mercury")]
+
+PASSING = {
+    "B50L": (3.43, 0.57, "at most 350"),
+    "BR": (-2.5, 1.0, "at most 1 750"),
+    "75R": (-1.15, -0.57, "at least 10 100"),
+    "75L": (3.43, -0.57, "at most 10 600"),
+    "50R": (-1.72, -0.86, "at least 10 100"),
+    "50L": (3.43, -0.86, "at most 18 480"),
+    "50V": (0.0, -0.86, "at least 5 100"),
+    "25L": (9.0, -1.72, "at least 1 700"),
+    "25R": (-9.0, -1.72, "at least 1 700"),
+    "HV": (0.0, 0.0, "at most 625"),
+}
+DRIVING = {
+    "HV": (0.0, 0.0, "40 500 to 215 000"),
+    "2.6° aside": (2.6, 0.0, "at least 20 300"),
+    "5.2° aside": (5.2, 0.0, "at least 5 100"),
+}
+"""Azimuth to the left, elevation [deg] and intensity [cd] of points of UN R112, class B, for traffic on the right."""
+
+
+def headlamp_table() -> str:
+    """Return what the headlamps of the traffic generator throw at the points of the regulation, with the lens's own light."""
+    lens = INTENSITY_CD["headlight"]
+    rows = []
+    for beam, points in (("low", PASSING), ("high", DRIVING)):
+        for name, (azimuth_deg, elevation_deg, limit) in points.items():
+            cells = []
+            for lamp in ("led", "halogen"):
+                thrown = float(beam_intensity_cd(beam_patterns(lamp, beam), azimuth_deg, elevation_deg))  # type: ignore[arg-type]
+                most = thrown + lens[1]
+                cells += [f"{number(thrown + lens[0])} to {number(most)}", number(most / 25.0**2)]
+            rows.append([beam, name, f"{0.0 - azimuth_deg:+.2f}°, {elevation_deg:+.2f}°", limit, *cells])
+    header = [
+        "beam",
+        "point",
+        "right, up",
+        "UN R112 [cd]",
+        "LED [cd]",
+        "at 25 m, most [lx]",
+        "halogen [cd]",
+        "at 25 m, most [lx]",
+    ]
+    return markdown_table(header, rows, left=4)
 
 
 def main() -> None:
@@ -233,9 +279,12 @@ def main() -> None:
     ]
     table = markdown_table(header, rows, left=2)
     print(table)
+    print(headlamp_table())
     if arguments.write:
+        page = DOCS.parent / "physics" / "street-lighting.md"
+        fill_page(page, "headlamps", headlamp_table())
         command = f"python -m benchmarks.road_lighting --samples {arguments.samples} --write"
-        fill_page(DOCS.parent / "physics" / "street-lighting.md", "results", f"```sh\n{command}\n```\n\n{table}")
+        fill_page(page, "results", f"```sh\n{command}\n```\n\n{table}")
 
 
 if __name__ == "__main__":
