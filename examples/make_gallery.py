@@ -29,9 +29,10 @@ TOWN = {
     "van": {"rate_per_s": 0.06},
     "bus": {"rate_per_s": 0.05},
     "cyclist": {"rate_per_s": 0.1},
-    "pedestrian": {"rate_per_s": 0.5},
+    "motorcycle": {"rate_per_s": 0.04},
+    "pedestrian": {"rate_per_s": 1.5, "density_per_km": 25},
 }
-VILLAGE = {"car": {"rate_per_s": 0.2, "density_per_km": 5}, "cyclist": {"rate_per_s": 0.08}, "pedestrian": {"rate_per_s": 0.2}}
+VILLAGE = {"car": {"rate_per_s": 0.2, "density_per_km": 5}, "cyclist": {"rate_per_s": 0.08}, "pedestrian": {"rate_per_s": 0.6}}
 EGO = {"kind": "car", "min_speed_m_s": 3, "min_road_ahead_m": 30}
 
 
@@ -49,7 +50,7 @@ SCENES: dict[str, dict[str, Any]] = {
     "city-noon": {"traffic": {"network": CITY, "demand": TOWN, "ego": EGO}, "light": sun(58, 190), "seed": 21},
     "city-evening": {"traffic": {"network": CITY, "demand": TOWN, "ego": EGO}, "light": sun(9, 265, 4), "seed": 22},
     "city-overcast-wet": {
-        "traffic": {"network": CITY, "demand": TOWN, "ego": EGO, "wet": True},
+        "traffic": {"network": CITY, "demand": TOWN, "ego": EGO, "wet": True, "season": "autumn", "dirt": {"vehicles": 0.8}},
         "light": overcast(2500),
         "seed": 23,
     },
@@ -57,6 +58,7 @@ SCENES: dict[str, dict[str, Any]] = {
         "traffic": {"network": CITY, "demand": TOWN, "ego": EGO, "lamps": "night"},
         "light": overcast(0.02),
         "seed": 10,
+        "f_number": 2.0,
         "quality": {"max_samples_per_pixel": 512, "max_sample_saturation": 1.5},
     },
     "junction-mast": {
@@ -65,7 +67,8 @@ SCENES: dict[str, dict[str, Any]] = {
             "demand": {
                 "car": {"rate_per_s": 0.7, "density_per_km": 12},
                 "lorry": {"rate_per_s": 0.08},
-                "pedestrian": {"rate_per_s": 0.4},
+                "motorcycle": {"rate_per_s": 0.05},
+                "pedestrian": {"rate_per_s": 1.2, "density_per_km": 20},
             },
             "time_s": 41,
         },
@@ -113,6 +116,7 @@ SCENES: dict[str, dict[str, Any]] = {
         "light": overcast(800),
         "atmosphere": {"kind": "fog", "visibility_m": 120},
         "seed": 28,
+        "quality": {"max_samples_per_pixel": 256},
     },
     "motorway": {
         "traffic": {
@@ -138,7 +142,7 @@ SCENES: dict[str, dict[str, Any]] = {
             "time_s": 25,
             "ego": {"kind": "car", "min_speed_m_s": 3},
         },
-        "light": sun(25, 250),
+        "light": sun(32, 120),
         "seed": 14,
     },
 }
@@ -149,7 +153,14 @@ def recipe(name: str) -> dict[str, Any]:
     scene = SCENES[name]
     pose = scene.get("pose", {"mount": {"at": "windscreen", "pitch_deg": -1}})
     exposure = {"auto": {"method": "percentile", "level": 0.6, "percentile": 97}}
-    sensor = {"name": "main", "model": "ar0132at-rgb", "rows": 270, "cols": 480, "exposure": exposure}
+    sensor = {
+        "name": "main",
+        "model": "ar0132at-rgb",
+        "rows": 270,
+        "cols": 480,
+        "exposure": exposure,
+        "isp": {"demosaic": "menon2007"},
+    }
     what: dict[str, Any] = {"traffic": scene["traffic"], "lights": [scene["light"]]}
     if "atmosphere" in scene:
         what["atmosphere"] = scene["atmosphere"]
@@ -158,7 +169,14 @@ def recipe(name: str) -> dict[str, Any]:
         "name": name,
         "seed": scene["seed"],
         "scene": what,
-        "cameras": [{"name": "main", "pose": pose, "lens": {"hfov_deg": 62, "f_number": 2.0}, "sensors": [sensor]}],
+        "cameras": [
+            {
+                "name": "main",
+                "pose": pose,
+                "lens": {"hfov_deg": 62, "f_number": scene.get("f_number", 4.0)},
+                "sensors": [sensor],
+            }
+        ],
         "outputs": ["image.png"],
         "quality": {"noise_ratio": 1.5, "max_samples_per_pixel": 96, "max_depth": 5, "max_sample_saturation": 3}
         | scene.get("quality", {}),

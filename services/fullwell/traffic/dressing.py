@@ -119,14 +119,14 @@ STYLES: Final[Mapping[str, StreetStyle]] = MappingProxyType(
             building_gap_m=40.0,
             building_share=0.25,
             building_tag="suburb",
-            layers=((5.0, 40.0, 14.0), (40.0, 140.0, 12.0), (140.0, 320.0, 30.0)),
+            layers=((5.0, 40.0, 10.0), (40.0, 140.0, 14.0), (140.0, 320.0, 55.0)),
             gardens=4.0,
             surfaces=RoadStyle(edge_lines=True, zebra=False, covers=False, fields=60),
         ),
         "motorway": StreetStyle(
             light_m=0.0,
             building_share=0.0,
-            layers=((12.0, 40.0, 14.0), (40.0, 140.0, 12.0), (140.0, 320.0, 24.0)),
+            layers=((12.0, 40.0, 12.0), (40.0, 140.0, 14.0), (140.0, 320.0, 40.0)),
             surfaces=RoadStyle(edge_lines=True, zebra=False, road="asphalt/new", covers=False, fields=60),
         ),
     }
@@ -521,7 +521,7 @@ def _layers(site: _Site) -> None:
         distances = shapely.distance(roads, shapely.points(places))
         wooded = rng.random(count) < 2.0 * _wooded(places, site.rng("woods").uniform(0.0, 1.0, (2, 6)))
         for number in np.flatnonzero((distances > nearest_m) & (distances <= farthest_m) & wooded):
-            kind = "tree" if rng.random() < 0.75 or not site.shelf.has("bush") else "bush"
+            kind = "tree" if rng.random() < 0.85 or not site.shelf.has("bush") else "bush"
             asset = site.shelf.draw(rng, kind, weights=_FREE_STANDING)
             if asset is None:
                 continue

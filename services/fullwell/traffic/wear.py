@@ -27,9 +27,9 @@ _REPAIR_M: Final = 0.002
 _SEAL_M: Final = 0.0025
 _COVER_M: Final = 0.003
 """Heights above the road; markings lie at 4 mm."""
-_REPAIRS_PER_M: Final = 1 / 90.0
-_SEALS_PER_M: Final = 1 / 110.0
-_COVERS_PER_M: Final = 1 / 55.0
+_REPAIRS_PER_M: Final = 1 / 60.0
+_SEALS_PER_M: Final = 1 / 45.0
+_COVERS_PER_M: Final = 1 / 40.0
 _GULLY_EVERY_M: Final = 25.0
 _COVER_RADIUS_M: Final = 0.3
 _KEEP_OFF_M: Final = 4.0
@@ -107,7 +107,7 @@ def _repairs(lane: Lane, rng: np.random.Generator) -> Iterator[tuple[Array, NDAr
     free = _free_m(lane)
     place_m = _KEEP_OFF_M
     for _ in range(int(rng.poisson(max(free, 0.0) * _REPAIRS_PER_M))):
-        long_m, whole, aside, gap_m = rng.uniform(1.2, 9.0), rng.random() < 0.3, rng.uniform(-1, 1), rng.exponential(45.0)
+        long_m, whole, aside, gap_m = rng.uniform(1.2, 9.0), rng.random() < 0.3, rng.uniform(-1, 1), rng.exponential(30.0)
         place_m += gap_m
         if place_m + long_m > _KEEP_OFF_M + free:
             return
