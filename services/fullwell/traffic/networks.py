@@ -10,13 +10,14 @@ import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, Literal
+from xml.etree import ElementTree
 
 from fullwell.core.errors import unknown_name_message
 from fullwell.core.hashing import sha256_hex
 from fullwell.traffic.sumo import SumoLimits, TrafficError, run_sumo_program, sumo_home
-from fullwell.traffic.templates import TEMPLATE_NAMES, CrossSection, PlainNetwork, template, with_section
+from fullwell.traffic.templates import PARKING, TEMPLATE_NAMES, CrossSection, PlainNetwork, template, with_section
 
-__all__ = ["GENERATED_NAMES", "NetworkFile", "NetworkSpec", "make_network", "read_road_file"]
+__all__ = ["DRIVES_ON_THE_LEFT", "GENERATED_NAMES", "NetworkFile", "NetworkSpec", "make_network", "read_road_file"]
 
 GENERATED_NAMES: Final = ("grid", "spider", "random")
 
@@ -96,6 +97,18 @@ def make_network(spec: NetworkSpec, *, path: str = "scene.traffic.network", limi
     return NetworkFile(xml, warnings)
 
 
+DRIVES_ON_THE_LEFT: Final = (
+    "which drives on the left. Streets are dressed and marked for driving on the right only: choose another area."
+)
+_OPENDRIVE_LANES: Final = (
+    f'<types><type id="parking" priority="1" speed="1.39" width="2.5" allow="{PARKING}"/>'
+    '<type id="shoulder" priority="0" speed="1.39" width="1.5" allow="emergency" discard="false"/>'
+    '<type id="stop" priority="0" speed="1.39" width="2.5" allow="emergency" discard="false"/>'
+    '<type id="bus" priority="1" speed="13.89" width="3.25" allow="bus taxi"/></types>'
+)
+"""Lanes that SUMO's own table of types takes for others."""
+
+
 def _cleaned(xml: bytes) -> bytes:
     """Return a network without comments, which hold dates, and without the files that its traffic lights would write."""
     plain = re.sub(rb"<!--.*?-->\s*", b"", xml, flags=re.DOTALL)
@@ -171,31 +184,65 @@ def _from_file(file: Path, folder: Path, path: str, limits: SumoLimits | None) -
             "--tls.guess-signals",
             "true",
         ]
-        read += ["--sidewalks.guess", "true", "--sidewalks.guess.min-speed", "5", "--crossings.guess", "true"]
-        read += [
-            "--osm.sidewalks",
-            "true",
-            "--osm.crossings",
-            "true",
-            "--osm.turn-lanes",
-            "true",
-            "--output.street-names",
-            "true",
-        ]
+        read += ["--osm.sidewalks", "true", "--osm.crossings", "true", "--osm.turn-lanes", "true", "--osm.lane-access", "true"]
+        read += ["--crossings.guess", "true", "--output.street-names", "true"]
+        # With these types, tags of cycle lanes and sidewalks make lanes.
+        maps = sumo_home() / "data" / "typemap"
+        types = [f"{maps}/osmNetconvert{what}.typ.xml" for what in ("", "Pedestrians", "Bicycle")]
+        read += ["--type-files", ",".join(types)]
     else:
         read = ["--opendrive-files", given.name, "--opendrive.curve-resolution", "1", "--opendrive.import-all-lanes", "true"]
         read += ["--opendrive.ignore-widths", "false", "--crossings.guess", "true"]
         # Who may use a lane follows from its type.
-        read += ["--type-files", str(sumo_home() / "data" / "typemap" / "opendriveNetconvertPedestrians.typ.xml")]
+        (folder / "lanes.typ.xml").write_text(_OPENDRIVE_LANES)
+        maps = sumo_home() / "data" / "typemap"
+        types = [f"{maps}/opendriveNetconvert{what}.typ.xml" for what in ("", "Pedestrians", "Bicycle")]
+        read += ["--type-files", ",".join([*types, "lanes.typ.xml"])]
+        if re.search(rb"<road\s[^>]*\brule=[\"']LHT", given.read_bytes()):
+            raise TrafficError(f"{path}.file is {file.name!r}, {DRIVES_ON_THE_LEFT}", f"{path}.file", file.name)
     common = list(_COMMON) if kind != "sumo" else ["--precision", "3"]
     arguments = [*read, "--output-file", "out.net.xml", *common]
     warnings = run_sumo_program(
         "netconvert", arguments, folder=folder, path=f"{path}.file", what=repr(file.name), limits=limits
     )
+    if kind == "osm":
+        return (*warnings, *_with_guessed_sidewalks(folder, f"{path}.file", limits))
     if kind == "sumo" and _version(given.read_bytes()) >= _PLAIN_VERSION:
         shutil.copyfile(given, folder / "out.net.xml")
         return ()
     return warnings
+
+
+def _with_guessed_sidewalks(folder: Path, path: str, limits: SumoLimits | None) -> tuple[str, ...]:
+    """Give streets sidewalks of which the map does not tell; not those that it says have one on the other side only."""
+    ways: dict[tuple[str, str], tuple[str, bool, bool]] = {}
+    for edge in ElementTree.parse(folder / "out.net.xml").getroot().iter("edge"):
+        if not edge.get("function"):
+            lanes = list(edge.iter("lane"))
+            walks, drives = (any(_admits(lane, who) for lane in lanes) for who in ("pedestrian", "passenger"))
+            ways[edge.get("from", ""), edge.get("to", "")] = (edge.get("id", ""), walks, drives)
+    left_out, lacking = [], False
+    for (start, end), (name, walks, drives) in ways.items():
+        if not drives or ways.get((end, start), ("", False, False))[1]:
+            left_out.append(name)
+        else:
+            lacking = lacking or not walks
+    if not lacking:
+        return ()
+    (folder / "out.net.xml").rename(folder / "bare.net.xml")
+    arguments = ["--sumo-net-file", "bare.net.xml", "--output-file", "out.net.xml", *_COMMON, "--crossings.guess", "true"]
+    arguments += ["--sidewalks.guess", "true", "--sidewalks.guess.min-speed", "5", "--offset.disable-normalization", "true"]
+    if left_out:  # in a file: of a town they are more than a command line holds
+        options = ElementTree.Element("configuration")
+        ElementTree.SubElement(options, "sidewalks.guess.exclude", value=",".join(left_out))
+        (folder / "guess.netccfg").write_bytes(ElementTree.tostring(options))
+        arguments = ["--configuration-file", "guess.netccfg", *arguments]
+    return run_sumo_program("netconvert", arguments, folder=folder, path=path, what="its sidewalks", limits=limits)
+
+
+def _admits(lane: ElementTree.Element, who: str) -> bool:
+    allowed = lane.get("allow")
+    return who in allowed.split() if allowed is not None else who not in lane.get("disallow", "").split()
 
 
 def _version(xml: bytes) -> float:

@@ -12,7 +12,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fullwell.traffic.networks import NetworkFile
+from fullwell.traffic.networks import DRIVES_ON_THE_LEFT, NetworkFile
 from fullwell.traffic.sumo import TrafficError
 from fullwell.traffic.templates import PARKING
 
@@ -162,11 +162,7 @@ class RoadNetwork:
 def read_network(file: NetworkFile, *, path: str = "scene.traffic.network") -> RoadNetwork:
     """Return the geometry of a network. Raises TrafficError where it cannot be read or holds no lane for vehicles."""
     if re.search(rb"<net\s[^>]*\blefthand=[\"'](?:true|1|yes|on|x)", file.xml):
-        raise TrafficError(
-            f"{path} drives on the left. Streets are dressed and marked for driving on the right only: choose another area, or "
-            "build it with netconvert --lefthand false.",
-            path,
-        )
+        raise TrafficError(f"{path} is a network {DRIVES_ON_THE_LEFT}", path)
     net = _sumo_net(file, path)
     lanes = list(_lanes(net))
     if not any(lane.kind in ("drive", "bus", "bike", "rail") for lane in lanes):

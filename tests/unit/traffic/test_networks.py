@@ -81,6 +81,34 @@ def test_openstreetmap_becomes_roads_whose_map_coordinates_come_back(tmp_path: P
     assert 5_333_000 < north < 5_336_000
 
 
+TAGGED_OSM = """<?xml version="1.0"?><osm version="0.6">
+<node id="1" lat="48.1370" lon="11.5740"/><node id="2" lat="48.1370" lon="11.5800"/><node id="3" lat="48.1390" lon="11.5770"/>
+<node id="4" lat="48.1370" lon="11.5770"><tag k="highway" v="traffic_signals"/></node><node id="8" lat="48.1350" lon="11.5770"/>
+<node id="6" lat="48.1371" lon="11.5740"/><node id="7" lat="48.1371" lon="11.5800"/>
+<way id="10"><nd ref="1"/><nd ref="4"/><nd ref="2"/><tag k="highway" v="secondary"/><tag k="lanes" v="4"/>
+<tag k="cycleway" v="lane"/><tag k="bus:lanes:forward" v="yes|designated"/><tag k="vehicle:lanes:forward" v="yes|no"/>
+<tag k="sidewalk" v="both"/></way>
+<way id="11"><nd ref="4"/><nd ref="3"/><tag k="highway" v="residential"/><tag k="sidewalk" v="right"/></way>
+<way id="13"><nd ref="8"/><nd ref="4"/><tag k="highway" v="residential"/></way>
+<way id="12"><nd ref="6"/><nd ref="7"/><tag k="railway" v="tram"/></way></osm>"""
+
+
+def test_tags_of_openstreetmap_become_lanes_and_only_streets_without_word_get_sidewalks(tmp_path: Path) -> None:
+    (tmp_path / "town.osm").write_text(TAGGED_OSM)
+    network = read_network(make_network(NetworkSpec(file=tmp_path / "town.osm")))
+    kinds: dict[str, list[str]] = {}
+    for lane in sorted(network.lanes, key=lambda lane: lane.index):
+        kinds.setdefault(lane.edge_id.partition("#")[0], []).append(lane.kind)
+    assert set(kinds["10"]) == {"sidewalk", "bike", "bus", "drive"}
+    assert set(kinds["-10"]) == {"sidewalk", "bike", "drive"}
+    assert kinds["11"] == ["sidewalk", "drive"]
+    assert kinds["-11"] == ["drive"], "the map says that it has none"
+    assert kinds["13"] == kinds["-13"] == ["sidewalk", "drive"], "the map does not tell"
+    assert kinds["12"] == ["rail"], "nobody walks along the tracks"
+    assert network.of_kind("crossing")
+    assert network.signals
+
+
 def test_opendrive_keeps_widths_slopes_and_sidewalks(tmp_path: Path) -> None:
     (tmp_path / "hill.xodr").write_text(XODR)
     network = read_network(make_network(NetworkSpec(file=tmp_path / "hill.xodr")))
@@ -90,6 +118,27 @@ def test_opendrive_keeps_widths_slopes_and_sidewalks(tmp_path: Path) -> None:
     climb = (east.centre_m[-1, 2] - east.centre_m[0, 2]) / east.length_m
     assert climb == pytest.approx(0.05, abs=0.003)
     np.testing.assert_allclose(network.to_map(east.centre_m[0])[0], 5000.0, atol=1.0)
+
+
+def test_lanes_of_opendrive_are_of_their_types(tmp_path: Path) -> None:
+    types = ("driving", "bus", "biking", "parking", "shoulder", "sidewalk")
+    lanes = "".join(
+        f'<lane id="{-1 - place}" type="{kind}" level="false"><width sOffset="0" a="{2 + place / 10}" b="0" c="0" d="0"/>'
+        "</lane>"
+        for place, kind in enumerate(types)
+    )
+    start = XODR.index("<right>") + len("<right>")
+    text = XODR[:start] + lanes + XODR[XODR.index("</right>") :]
+    (tmp_path / "a.xodr").write_text(text)
+    network = read_network(make_network(NetworkSpec(file=tmp_path / "a.xodr")))
+    right = [lane for lane in network.lanes if lane.kind != "walking_area" and lane.edge_id.startswith("-")]
+    told = [(lane.kind, lane.width_m) for lane in sorted(right, key=lambda lane: -lane.index)]
+    kinds = ("drive", "bus", "bike", "parking", "shoulder", "sidewalk")
+    assert told == [(kind, pytest.approx(2 + place / 10)) for place, kind in enumerate(kinds)]
+    assert not any(lane.has_rails for lane in right)
+    (tmp_path / "uk.xodr").write_text(text.replace('junction="-1"', 'junction="-1" rule="LHT"'))
+    with pytest.raises(TrafficError, match="which drives on the left"):
+        make_network(NetworkSpec(file=tmp_path / "uk.xodr"))
 
 
 def test_a_network_far_from_its_origin_is_moved_and_says_where_it_is(tmp_path: Path) -> None:

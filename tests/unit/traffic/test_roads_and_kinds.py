@@ -231,7 +231,7 @@ def test_a_network_of_a_present_version_is_taken_as_it_is(tmp_path: Path) -> Non
 def test_driving_on_the_left_is_refused(tmp_path: Path) -> None:
     text = make_network(NetworkSpec("cross", length_m=150.0)).xml
     (tmp_path / "uk.net.xml").write_bytes(text.replace(b"<net ", b'<net lefthand="true" ', 1))
-    with pytest.raises(TrafficError, match="drives on the left") as caught:
+    with pytest.raises(TrafficError, match="which drives on the left") as caught:
         read_network(make_network(NetworkSpec(file=tmp_path / "uk.net.xml")))
     assert caught.value.path == "scene.traffic.network"
 
