@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gc
 import logging
+import os
+import sys
 from collections.abc import Iterator
 
 import pytest
@@ -14,14 +16,25 @@ from servers import s3_server, valkey_server
 __all__ = ["logs_end_with_their_test", "s3_server", "valkey_server"]
 
 
-def pytest_collection_finish() -> None:
-    """Take what collecting left in memory out of the garbage collector's rounds.
+# Every run of the tests, and the processes that they start, compiles the same few hundred modules: once is enough.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
-    The renderer asks for a round with each scene. Half a million objects of modules and of parameters that live to the end made
+
+def pytest_collection() -> None:
+    """Collect tests without rounds of the garbage collector: next to nothing of what is made is garbage."""
+    gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """Take what collecting has made out of the garbage collector's rounds.
+
+    The renderer asks for a round with each scene. Half a million objects of modules and parameters, which live to the end, made
     one last 0.3 s: more than most of the scenes that tests render.
     """
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(autouse=True)
