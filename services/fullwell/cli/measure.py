@@ -407,7 +407,7 @@ def _scene_light(frame: _Frame) -> Spectrum | None:
         frame.notes.append(f"the scene could not be built from the recipe in the manifest: {error}")
         return None
     (rig,) = [rig for rig in described.cameras if rig.camera.name == frame.camera["name"]]
-    return scene_illuminant(described.scene, rig.camera)
+    return scene_illuminant(described.scene, rig.camera, dict(described.group_weights))
 
 
 def _scene_report(frame: _Frame) -> dict[str, Any]:

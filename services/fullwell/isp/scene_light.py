@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache, lru_cache
+from types import MappingProxyType
 from typing import assert_never
 
 import numpy as np
@@ -37,6 +40,7 @@ from fullwell.scene import (
     SpotLight,
     SunSky,
 )
+from fullwell.scene.groups import sun_group
 
 __all__ = ["point_of_interest_m", "scene_illuminant"]
 
@@ -52,21 +56,25 @@ _NEAREST_M = 1e-3
 _NO_OBJECTS_AHEAD_M = 1.0
 
 
-def scene_illuminant(scene: SceneDescription, camera: Camera) -> Spectrum | None:
+def scene_illuminant(
+    scene: SceneDescription, camera: Camera, group_weights: Mapping[str, float] = MappingProxyType({})
+) -> Spectrum | None:
     """Return the light that a white card at the point the camera looks at gets, relative power, or None in the dark.
 
     The sum over all lights of the irradiance on a card that faces each of them, without shadows and without light that other
     surfaces reflect. Area lights count with the area that the point sees; where none is turned towards it, with a quarter of
     their area, as for rooms that are lit by way of the ceiling. Sun and sky are those of the picture: the sun on a card that
-    faces it, and the sky on horizontal ground, each times its weight.
+    faces it, and the sky on horizontal ground, each times its weight. `group_weights` are those of light groups in the picture,
+    1 where they are not named.
     """
     point_m = point_of_interest_m(scene, camera)
-    total = sum((_irradiance(light, point_m) for light in scene.lights), np.zeros(_grid().count))
+    weighted = (_of_groups(light, group_weights) for light in scene.lights)
+    total = sum((weight * _irradiance(light, point_m) for light, weight in weighted), np.zeros(_grid().count))
     direct, turned_away = np.zeros(_grid().count), np.zeros(_grid().count)
     for item in scene.objects:
         for part in item.parts:
             if part.emission is not None:
-                radiance = _band_values(part.emission.radiance)
+                radiance = _band_values(part.emission.radiance) * group_weights.get(part.emission.group, 1.0)
                 facing, whole = _solid_angles_sr(part.geometry, item.to_world @ part.to_object, point_m)
                 direct += radiance * facing
                 turned_away += radiance * whole
@@ -78,6 +86,14 @@ def scene_illuminant(scene: SceneDescription, camera: Camera) -> Spectrum | None
     return Spectrum(
         _grid().centres_nm, total / np.max(total), outside="zero", unit="relative", source="the lights of the scene"
     )
+
+
+def _of_groups(light: Light, weights: Mapping[str, float]) -> tuple[Light, float]:
+    """Return a light with sun and sky weighted by their groups, and the weight of any other."""
+    if not isinstance(light, SunSky):
+        return light, weights.get(light.group, 1.0)
+    sun = light.sun_weight * weights.get(sun_group(light), 1.0)
+    return replace(light, sun_weight=sun, sky_weight=light.sky_weight * weights.get(light.group, 1.0)), 1.0
 
 
 def point_of_interest_m(scene: SceneDescription, camera: Camera) -> NDArray[np.float64]:

@@ -375,7 +375,8 @@ def _sensor_products(
         document |= _raw_document(raw, sensor.model) | _noise_document(run.frame, rig, sensor, images, raw)
         _add(run, f"{folder}raw.npz", lambda: encode.encode_raw_npz(raw))
         _add(run, f"{folder}raw.tiff", lambda: encode.encode_raw_tiff(raw))
-        light = scene_illuminant(run.frame.scene, rig.camera) if sensor.isp.illuminant is None else None
+        weights = dict(run.frame.group_weights)
+        light = scene_illuminant(run.frame.scene, rig.camera, weights) if sensor.isp.illuminant is None else None
         _add(run, f"{folder}raw.dng", lambda: encode_raw_dng(raw, sensor.isp, scene_light=light))
         if run.plan.display:
             with run.stage(f"{rig.camera.name}/{sensor.name}: isp"):

@@ -169,3 +169,17 @@ def test_the_camera_looks_where_it_is_focused_and_else_at_the_objects() -> None:
     at[:3, 3] = [1.0, 3.0, 0.0]
     thing = SceneObject("thing", "", (Part(Sphere(), BLACK),), at)
     np.testing.assert_allclose(point_of_interest_m(scene(objects=(thing,)), camera(math.inf)), [0.0, 3.0, 0.0], atol=1e-12)
+
+
+def test_light_groups_weigh_what_the_picture_shows() -> None:
+    """By night weights the sun's light is none of the picture's."""
+    apart = SunSky((0.0, 0.5, 0.8), group="sky", sun_group="sun")
+    both = scene(apart, PointLight((0.0, 0.0, 3.0), WARM, group="lamps"))
+
+    def seen(**weights: float) -> Spectrum | None:
+        return scene_illuminant(both, camera(), weights)
+
+    assert 9000 < kelvin(seen(sun=0.0, lamps=0.0)) < 13000
+    assert 5000 < kelvin(seen(sky=0.0, lamps=0.0)) < 5600
+    assert kelvin(seen(sun=0.0, sky=0.0)) == pytest.approx(3000, abs=5)
+    assert seen(sun=0.0, sky=0.0, lamps=0.0) is None
