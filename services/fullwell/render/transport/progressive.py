@@ -221,19 +221,21 @@ def _lanes_by_moment(
     turns: Turns, count: int, pixels: NDArray[np.int64], first: NDArray[np.int64], counts: NDArray[np.int64]
 ) -> list[_Lanes]:
     """Return the lanes that take samples [first, first + counts) of each pixel in each of `count` moments."""
-    replicas = np.tile(np.arange(REPLICAS), len(pixels))
-    columns = []
+    replicas = np.tile(np.arange(REPLICAS, dtype=np.int32), len(pixels))
+    of_lanes = np.repeat(pixels.astype(np.int32), REPLICAS)
+    moments, columns = [], []
     for step in range(turns.steps):
         begin, more = turns.span(first, counts, step)
-        moment = turns.moment(pixels, step)
-        by_lane = [np.repeat(values, REPLICAS) for values in (pixels, begin, more)]
-        table = np.stack([moment.ravel(), by_lane[0], replicas, by_lane[1], by_lane[2], np.full(len(replicas), step)])
-        columns.append(table[:, table[4] > 0])
+        busy = np.repeat(more > 0, REPLICAS)
+        moments.append(turns.moment(pixels, step).astype(np.uint16).ravel()[busy])
+        spans = [np.repeat(values.astype(np.int32), REPLICAS)[busy] for values in (begin, more)]
+        columns.append(np.stack([of_lanes[busy], replicas[busy], *spans, np.full(len(spans[0]), step, dtype=np.int32)]))
+    moment = np.concatenate(moments)
+    # Step by step within a moment: equal counts stay side by side.
+    order = np.argsort(moment, kind="stable")
+    ends = np.concatenate([[0], np.cumsum(np.bincount(moment, minlength=count))])
     table = np.concatenate(columns, axis=1)
-    # Equal counts side by side, as without motion.
-    table = table[:, np.lexsort((table[4], table[0]))]
-    ends = np.searchsorted(table[0], np.arange(count + 1))
-    return [_Lanes(*table[1:, begin:end]) for begin, end in itertools.pairwise(ends)]
+    return [_Lanes(*table[:, order[begin:end]].astype(np.int64)) for begin, end in itertools.pairwise(ends)]
 
 
 class ProgressiveImage:
