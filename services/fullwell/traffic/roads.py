@@ -24,6 +24,9 @@ LaneKind = Literal["drive", "bus", "bike", "parking", "sidewalk", "shoulder", "r
 _FAR_M: Final = 10_000.0
 """Networks that lie farther from their origin are moved: float32 is 1 mm coarse at 10 km."""
 
+_BACK_M: Final = 25.0
+"""A way back ends this near to where the way there began: on the other side of the road."""
+
 _DEFAULT_WIDTHS_M: Final[Mapping[str, float]] = {"sidewalk": 2.0, "crossing": 4.0, "bike": 1.5}
 
 
@@ -122,6 +125,20 @@ class RoadNetwork:
     successors: Mapping[str, tuple[str, ...]]
     classes: Mapping[tuple[str, str], frozenset[str]] = field(default_factory=dict)
     ends_m: Array = field(default_factory=lambda: np.zeros((0, 2)))
+
+    @property
+    def has_junctions(self) -> bool:
+        """Whether roads meet: from some edge several lead on, ways back not counted."""
+        starts, ends = ({lane.edge_id: lane.centre_m[place] for lane in self.lanes} for place in (0, -1))
+
+        def leads_back(edge: str, following: str) -> bool:
+            return float(np.linalg.norm(ends[following][:2] - starts[edge][:2])) < _BACK_M
+
+        return any(
+            sum(not leads_back(edge, other) for other in following if other in ends) > 1
+            for edge, following in self.successors.items()
+            if edge in starts
+        )
 
     def reachable(self, edge: str, *, vclass: str = "") -> frozenset[str]:
         """Return the edges that a vehicle (of a class of SUMO's, where given) can come to from an edge, itself among them."""

@@ -81,11 +81,13 @@ class TrafficDemand:
     `entry_rates_per_s` are new ones per second at each way into the network, with as many there at the start as such a stream
     has on its way; kinds that the network has no lane for, or that have no model, are left out of these. A network without an
     end has a tenth of its edges as ways in. A kind that is in none of the three does not appear.
+    `junction_share` is the share of the vehicles among these where roads meet.
     """
 
     rates_per_s: Mapping[TrafficKind, float] = field(default_factory=dict)
     densities_per_km: Mapping[TrafficKind, float] = field(default_factory=dict)
     entry_rates_per_s: Mapping[TrafficKind, float] = field(default_factory=dict)
+    junction_share: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -297,6 +299,7 @@ def _trips(
     for kind in TRAFFIC_KINDS:
         rate, density = demand.rates_per_s.get(kind, 0.0), demand.densities_per_km.get(kind, 0.0)
         entry_rate = demand.entry_rates_per_s.get(kind, 0.0)
+        entry_rate *= demand.junction_share if kind != "pedestrian" and network.has_junctions else 1.0
         if rate <= 0 and density <= 0 and entry_rate <= 0:
             continue
         edges = _usable_edges(network, kind)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import shapely
 
-from fullwell.traffic.demand import LEVELS, PRESETS, preset
+from fullwell.traffic.demand import JUNCTION_SHARES, LEVELS, PRESETS, preset
 from fullwell.traffic.networks import GENERATED_NAMES, NetworkSpec, make_network
 from fullwell.traffic.placement import AssetShelf
 from fullwell.traffic.roads import RoadNetwork, read_network
@@ -195,6 +195,18 @@ def test_a_preset_brings_as_many_as_its_rates_say() -> None:
     levels = [len(movers_of(network, TrafficDemand(entry_rates_per_s=preset("suburb", level)), models())) for level in LEVELS]
     assert levels == sorted(levels)
     assert levels[0] < levels[2]
+
+
+def test_a_city_where_roads_meet_does_not_stand_still() -> None:
+    for layout, meets in (("straight", False), ("curve", False), ("motorway", False), ("cross", True), ("roundabout", True)):
+        assert network_of(layout, CrossSection()).has_junctions == meets
+    network, speeds = network_of("blocks", CrossSection()), []
+    for level in ("low", "high"):
+        demand = TrafficDemand(entry_rates_per_s=preset("city", level), junction_share=JUNCTION_SHARES["city"])
+        cars = [mover.speed_m_s for mover in movers_of(network, demand, models(), 60.0) if mover.kind == "car"]
+        speeds.append(float(np.mean(cars)))
+    assert speeds[0] > 4.0
+    assert speeds[0] > speeds[1]
 
 
 @pytest.mark.parametrize(

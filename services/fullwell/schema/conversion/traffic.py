@@ -117,7 +117,7 @@ def _shelf(document: TrafficDocument, context: Context) -> tuple[AssetShelf, lis
 
 
 def _spec(document: TrafficDocument, context: Context) -> StreetSpec:
-    from fullwell.traffic.demand import preset  # noqa: PLC0415
+    from fullwell.traffic.demand import JUNCTION_SHARES, preset  # noqa: PLC0415
     from fullwell.traffic.networks import NetworkSpec  # noqa: PLC0415
     from fullwell.traffic.simulation import TrafficDemand  # noqa: PLC0415
     from fullwell.traffic.street import StreetSpec  # noqa: PLC0415
@@ -137,6 +137,7 @@ def _spec(document: TrafficDocument, context: Context) -> StreetSpec:
             {kind: entry.rate_per_s for kind, entry in kinds if entry.rate_per_s > 0},
             {kind: entry.density_per_km for kind, entry in kinds if entry.density_per_km > 0},
             preset(demand.preset, demand.level, without=[kind for kind, _ in kinds]) if demand.preset else {},
+            JUNCTION_SHARES.get(demand.preset or "", 1.0),
         ),
         style=document.style,
         run=run,
