@@ -189,8 +189,7 @@ def _illuminance_lux(lamps: list[_Lamp], point: tuple[float, float, float]) -> f
     return total
 
 
-CASES = [(style, "asset", seed) for style in ("city", "suburb") for seed in (1, 2, 3)]
-CASES += [("city", lamps, 2) for lamps in ("sodium", "mercury")]
+CASES = [("city", "asset", seed) for seed in (1, 2, 3)] + [("suburb", "asset", 1)]
 
 PASSING = {
     "B50L": (3.43, 0.57, "at most 350"),
