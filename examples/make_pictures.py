@@ -47,16 +47,17 @@ def make(recipe: Path, target: Path, *, overrides: dict[str, str]) -> None:
         assets = assets_of_settings(load_settings())
         document = pin_assets(document, assets)
     builder, cache = RecipeBuilder(document, base_dir=document.base_dir, assets=assets), LightCache()
-    frames = [builder.frame(index) for index in range(document.frame_count())]
+    captions: list[str] = []
     with tempfile.TemporaryDirectory() as folder:
         store = LocalStore(Path(folder))
-        for frame in frames:
-            render_frame(frame, store, f"{frame.index}", cache=cache)
+        for index in range(document.frame_count()):
+            frame = builder.frame(index)  # one at a time: eight streets do not fit into the memory of a small machine
+            render_frame(frame, store, f"{index}", cache=cache)
+            captions.append(", ".join(f"{path.rpartition('.')[2]} {value}" for path, value in frame.varied))
         first = {info.key.partition("/")[2]: store.get(info.key) for info in store.list("0/")}
-        images = [Image.open(io.BytesIO(first_picture(store, f"{frame.index}/"))) for frame in frames]
+        images = [Image.open(io.BytesIO(first_picture(store, f"{index}/"))) for index in range(len(captions))]
     save(picture_of_products(first, f"{document.name}, frame 0"), target / f"{recipe.stem}.png")
-    if len(frames) > 1:
-        captions = [", ".join(f"{path.rpartition('.')[2]} {value}" for path, value in frame.varied) for frame in frames]
+    if len(captions) > 1:
         save(strip(images, captions), target / f"{recipe.stem}_frames.jpg")
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import os
 import resource
+import signal
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,6 +20,7 @@ __all__ = ["SumoLimits", "TrafficError", "run_sumo_program", "sumo_home"]
 
 _SHOWN_LINES: Final = 4
 _MIB: Final = 1 << 20
+_PATIENCE: Final = 5.0
 
 
 class TrafficError(FieldError):
@@ -26,7 +29,10 @@ class TrafficError(FieldError):
 
 @dataclass(frozen=True, slots=True)
 class SumoLimits:
-    """What one run of a program may take: wall time [s], memory and size of a written file [bytes]."""
+    """What one run of a program may take: processor time [s], memory and size of a written file [bytes].
+
+    Time by the clock may be `_PATIENCE` times as long, on a machine that is busy with other things.
+    """
 
     time_s: float = 120.0
     memory_bytes: int = 4096 * _MIB
@@ -72,15 +78,17 @@ def run_sumo_program(
             capture_output=True,
             text=True,
             errors="replace",
-            timeout=allowed.time_s,
+            timeout=_PATIENCE * allowed.time_s,
             check=False,
             preexec_fn=lambda: _limit(allowed),
         )
     except subprocess.TimeoutExpired:
-        raise TrafficError(f"{path}: {name} took longer than {allowed.time_s:g} s for {what}. Make it smaller.", path) from None
+        raise _too_long(path, name, what, _PATIENCE * allowed.time_s) from None
     except OSError as error:
         raise TrafficError(f"{path}: {name} could not be started ({error.strerror}).", path) from error
     lines = [line.strip() for line in (told.stderr + "\n" + told.stdout).splitlines()]
+    if told.returncode == -signal.SIGXCPU:
+        raise _too_long(path, name, what, allowed.time_s)
     if told.returncode != 0:
         errors = [_without_folder(line, folder) for line in lines if line.startswith("Error")]
         cause = " ".join(errors[:_SHOWN_LINES]) or _ending(told.returncode)
@@ -88,8 +96,14 @@ def run_sumo_program(
     return tuple(_without_folder(line.removeprefix("Warning: "), folder) for line in lines if line.startswith("Warning"))
 
 
+def _too_long(path: str, name: str, what: str, time_s: float) -> TrafficError:
+    return TrafficError(f"{path}: {name} took longer than {time_s:g} s for {what}. Make it smaller.", path)
+
+
 def _limit(limits: SumoLimits) -> None:
-    for kind, value in ((resource.RLIMIT_AS, limits.memory_bytes), (resource.RLIMIT_FSIZE, limits.file_bytes)):
+    seconds = math.ceil(limits.time_s)
+    wanted = {resource.RLIMIT_AS: limits.memory_bytes, resource.RLIMIT_FSIZE: limits.file_bytes, resource.RLIMIT_CPU: seconds}
+    for kind, value in wanted.items():
         _, hard = resource.getrlimit(kind)
         resource.setrlimit(kind, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

@@ -198,4 +198,4 @@ def test_an_unknown_layout_is_answered_with_the_nearest() -> None:
 
 def test_a_program_that_takes_too_long_is_ended() -> None:
     with pytest.raises(TrafficError, match=r"took longer than 0\.01 s"):
-        make_network(NetworkSpec("grid", size=(30, 30)), limits=SumoLimits(time_s=0.01))
+        make_network(NetworkSpec("grid", size=(30, 30)), limits=SumoLimits(time_s=0.002))
