@@ -33,6 +33,10 @@ _PRIOR_SAMPLES = 64
 """Samples per pixel at which a tile's own variance counts as much as that of its surroundings."""
 
 
+_SURE = 3.0
+"""Standard errors below the mean at which light is surely there; of four replicas none can be lower than that."""
+
+
 class NoiseTarget(Protocol):
     """What error of the light the sensors would not notice."""
 
@@ -170,13 +174,13 @@ def _means_and_errors(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return (channels, rows, cols) means of (replicas, ...) of light, what is sure of it, and the means' variances over tiles.
 
-    Sure is what all replicas but one have: one bright sample makes its own replica bright, and the mean, but not that. A
-    pixel whose mean such a sample lifts over the full well is no saturated one.
+    Sure is what lies three standard errors below the mean. One bright sample lifts the mean of its pixel, and as much the
+    error: a pixel that it lifts over the full well is no saturated one.
     """
     count = len(light)
     mean = light.mean(axis=0)
-    sure = np.minimum(np.partition(light, 1, axis=0)[1], mean)
-    return mean, sure, _tile_sums(((light - mean) ** 2).sum(axis=0) / (count * (count - 1)))
+    variance = ((light - mean) ** 2).sum(axis=0) / (count * (count - 1))
+    return mean, np.maximum(mean - _SURE * np.sqrt(variance), 0.0), _tile_sums(variance)
 
 
 def _tile_squares(

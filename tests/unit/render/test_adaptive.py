@@ -187,8 +187,17 @@ def test_pixel_that_every_replica_sees_saturated_is_a_saturated_one() -> None:
     light = np.full((REPLICAS, 1, 1, TILE, TILE), 100 * FullWell.FULL)
     light[0] *= 1.2
     ratio = tile_errors(light, [(ONE_VIEW, FullWell())]).ratio[0, 0]
-    # Replicas at 1.2, 1, 1, 1: a standard error of 0.05, over an allowance of 0.1 times what all but one have.
-    assert ratio == pytest.approx(0.5, rel=1e-6)
+    # Replicas at 1.2, 1, 1, 1: a mean of 1.05, a standard error of 0.05, an allowance of a tenth of what is surely there.
+    assert ratio == pytest.approx(0.05 / 0.09, rel=1e-6)
+
+
+def test_three_bright_replicas_of_four_do_not_make_a_pixel_saturated_either() -> None:
+    """A lamp that fills a ten thousandth of a pixel: some replicas meet it, and their number is luck."""
+    light = np.full((REPLICAS, 1, 1, TILE, TILE), LIGHT)
+    light[:, 0, 0, 0, 0] = np.array([2.0, 2.0, 3.0, 0.5]) * FullWell.FULL
+    ratio = tile_errors(light, [(ONE_VIEW, FullWell())]).ratio[0, 0]
+    # Their standard error is 0.515 of the full well: over the unit noise of 64 pixels.
+    assert ratio == pytest.approx(0.515 * FullWell.FULL / 8, rel=0.01)
 
 
 @pytest.mark.parametrize("cap", [4, 8, 16, 100])
