@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
+from assets_in_memory import MemoryAssets, street_boxes
 from fullwell.radiometry import Spectrum
-from fullwell.scene import Conductor, Dielectric, Diffuse, Emission, Material, Mesh, Principled, RoughPlastic
+from fullwell.scene import (
+    Conductor,
+    Dielectric,
+    Diffuse,
+    Emission,
+    Material,
+    Mesh,
+    Principled,
+    RoughPlastic,
+    SceneDescription,
+)
+from fullwell.schema import build_frame, load_recipe
 from fullwell.schema.conversion.dirt import by_height, dirt_of_vehicle, soiled
 
 GREY = Spectrum.constant(0.5)
@@ -84,3 +98,71 @@ def test_panes_and_lamps_are_wiped() -> None:
     assert isinstance(pane, RoughPlastic)
     assert isinstance(body, RoughPlastic)
     assert glass.roughness < pane.roughness < body.roughness
+
+
+def scene(assets: MemoryAssets, **traffic: Any) -> SceneDescription:
+    recipe = {
+        "schema": "fullwell/recipe/v1",
+        "name": "street",
+        "seed": 5,
+        "scene": {
+            "traffic": {
+                "network": {"layout": "straight", "length_m": 120},
+                "demand": {"car": {"density_per_km": 30}, "pedestrian": {"density_per_km": 10}},
+                "time_s": 2,
+                "dressed": False,
+                **traffic,
+            },
+            "lights": [{"name": "sky", "kind": "constant_environment", "luminance_cd_m2": 3000, "spd": "D65"}],
+        },
+        "cameras": [
+            {
+                "name": "mast",
+                "pose": {"origin_m": [60, 20, 6], "target_m": [60, 0, 0]},
+                "lens": {"kind": "pinhole", "hfov_deg": 60, "f_number": 4},
+                "sensors": [{"name": "s", "model": "imx363", "rows": 48, "cols": 64, "exposure": {"time_s": 0.001}}],
+            }
+        ],
+        "outputs": ["labels.json"],
+    }
+    return build_frame(load_recipe(recipe), assets=assets).scene
+
+
+def told(described: SceneDescription) -> list[tuple[str, str, bytes, str]]:
+    return [
+        (item.id, part.name, np.asarray(part.geometry.vertices_m).tobytes(), repr_of(part.material))
+        for item in described.objects
+        for part in item.parts
+        if isinstance(part.geometry, Mesh)
+    ]
+
+
+def repr_of(material: Material) -> str:
+    match material:
+        case Diffuse(Spectrum() as spectrum) | RoughPlastic(Spectrum() as spectrum):
+            return f"{type(material).__name__} {spectrum.values.tobytes().hex()}"
+    return type(material).__name__
+
+
+def test_a_street_without_dirt_is_what_it_was_and_a_dirty_one_differs_in_vehicles_and_roads_alone(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    assets = MemoryAssets(*street_boxes(), folder=tmp_path_factory.mktemp("assets"))
+    clean = scene(assets)
+    assert told(scene(assets, dirt={"vehicles": 0, "roads": 0})) == told(clean)
+    dirty = scene(assets, dirt={"vehicles": 0.8, "roads": 0.5})
+    assert [item.id for item in dirty.objects] == [item.id for item in clean.objects]
+    for before, after in zip(clean.objects, dirty.objects, strict=True):
+        same = told_of(before) == told_of(after)
+        assert same == (before.semantic_class in ("pedestrian", "terrain")), before.id
+        if before.semantic_class == "car":
+            assert len(after.parts) > len(before.parts)
+            areas = [
+                sum(area_m2(part.geometry) for part in item.parts if isinstance(part.geometry, Mesh))
+                for item in (before, after)
+            ]
+            assert areas[1] == pytest.approx(areas[0], rel=1e-6)
+
+
+def told_of(item: Any) -> list[tuple[bytes, str]]:
+    return [(np.asarray(part.geometry.vertices_m).tobytes(), repr_of(part.material)) for part in item.parts]
