@@ -1,6 +1,6 @@
 """Scenes that break renderers, each with what must come of it: one clear refusal, a closed form, or a benign twin's image.
 
-`python hostile_scenes.py ID` runs one case; its test does so in a child process where the case may kill the process.
+`python hostile_scenes.py ID...` runs cases one after the other; tests do so in a child process where a case may kill the process.
 `python hostile_scenes.py --page` writes the tables of docs/validation/stability.md anew.
 """
 
@@ -900,6 +900,8 @@ if __name__ == "__main__":
         rewrite(PAGE)
         sys.exit()
     try:
-        check({case.id: case for case in HOSTILE}[sys.argv[1]])
+        for name in sys.argv[1:]:
+            print(name, flush=True)
+            check({case.id: case for case in HOSTILE}[name])
     except (AssertionError, FullwellError) as failure:
         sys.exit(f"{type(failure).__name__}: {failure}")

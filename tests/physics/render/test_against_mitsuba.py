@@ -34,6 +34,18 @@ SHARPEST = 0.02
 """A tile and band must be known to this, relative to the image's mean, or the test would pass for lack of light."""
 
 
+QUICK = (
+    "diffuse_box",
+    "rough_copper",
+    "point_and_spot",
+    "directional",
+    "constant_environment",
+    "image_environment",
+    "ball_by_a_bulb",
+)
+"""Scenes for the quick run: a material with lobes, every kind of light but the sun, and the cheapest of their kind."""
+
+
 def assert_agreement(found: Agreement) -> None:
     low, high = found.square_limits
     assert np.abs(found.means).max() < MEAN_LIMIT
@@ -43,7 +55,7 @@ def assert_agreement(found: Agreement) -> None:
     assert found.tile_error < SHARPEST
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in SCENES])
 def test_scene_agrees_with_mitsuba_within_the_noise_of_both(name: str) -> None:
     comparison = SCENES[name]()
     ours = np.stack([our_image(comparison, seed) for seed in range(IMAGES)])
@@ -51,6 +63,7 @@ def test_scene_agrees_with_mitsuba_within_the_noise_of_both(name: str) -> None:
     assert_agreement(compare(ours, theirs))
 
 
+@pytest.mark.slow
 def test_bands_counted_as_channels_agree_with_mitsuba_too() -> None:
     """Channels draw their wavelengths by chance where bands are visited by turns."""
     comparison = replace(SCENES["disk_and_cylinder_lamps"](), samples=128)

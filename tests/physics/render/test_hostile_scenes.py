@@ -27,11 +27,28 @@ def test_hostile_scene_ends_in_a_correct_image_or_one_clear_error(case: Hostile)
     check(case)
 
 
-@pytest.mark.parametrize("case", [pytest.param(case, id=case.id) for case in HOSTILE if case.may_kill])
-def test_scene_that_might_kill_the_process_does_not(case: Hostile) -> None:
-    command = [sys.executable, str(HERE / "hostile_scenes.py"), case.id]
+def survives(*cases: Hostile) -> None:
+    """Check cases in a process of their own, one after the other."""
+    command = [sys.executable, str(HERE / "hostile_scenes.py"), *(case.id for case in cases)]
     ended = subprocess.run(command, env=dict(os.environ), check=False, capture_output=True, text=True)
+    assert ended.stdout.splitlines() == [case.id for case in cases], "the last one that is named here ended the process"
     assert ended.returncode == 0, f"exit code {ended.returncode}: {ended.stderr[-2000:]}"
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(case, id=case.id, marks=pytest.mark.slow if "10,000 lamps" in case.id else ())
+        for case in HOSTILE
+        if case.may_kill and not case.refused
+    ],
+)
+def test_scene_that_might_kill_the_process_does_not(case: Hostile) -> None:
+    survives(case)
+
+
+def test_scenes_that_are_refused_lest_they_kill_the_process_do_not() -> None:
+    survives(*(case for case in HOSTILE if case.may_kill and case.refused))
 
 
 def test_surface_query_refuses_what_the_picture_refuses() -> None:

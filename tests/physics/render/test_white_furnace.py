@@ -55,6 +55,8 @@ MATERIALS: list[tuple[str, Material, int]] = [
 ]
 """With camera rays per film sample that bring the standard error below `LARGEST_ERROR`."""
 
+SLOW = ("glass of roughness 0.3", "glass of roughness 1.0", "dispersive glass of roughness 0.02")
+
 
 def relative_to_light(objects: tuple[SceneObject, ...], samples: int, depth: int) -> tuple[float, float]:
     """Return (mean over the film of 16 x 12 samples, its standard error), in units of the dome."""
@@ -84,7 +86,10 @@ def check_unseen(objects: tuple[SceneObject, ...], samples: int, depth: int = 51
     assert mean == pytest.approx(1.0, abs=ANALYTIC_TOLERANCE)
 
 
-@pytest.mark.parametrize(("material", "samples"), [pytest.param(m, n, id=name) for name, m, n in MATERIALS])
+@pytest.mark.parametrize(
+    ("material", "samples"),
+    [pytest.param(m, n, id=name, marks=pytest.mark.slow if name in SLOW else ()) for name, m, n in MATERIALS],
+)
 def test_white_ball_is_unseen_in_a_dome(material: Material, samples: int) -> None:
     check_unseen(ball(material), samples)
 
