@@ -1,6 +1,6 @@
 """Scenes that break renderers, each with what must come of it: one clear refusal, a closed form, or a benign twin's image.
 
-`python hostile_scenes.py ID...` runs cases one after the other; tests do so in a child process where a case may kill the process.
+`python hostile_scenes.py ID...` runs cases one after the other; tests do so in a child process where one may kill the process.
 `python hostile_scenes.py --page` writes the tables of docs/validation/stability.md anew.
 """
 
