@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import gzip
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final, Literal
+from typing import IO, Any, Final, Literal, cast
 from xml.etree.ElementTree import ParseError, iterparse
 
 import numpy as np
@@ -208,7 +209,7 @@ def read_fcd(
                 break
         if here is not None and waiting and abs(waiting[0] - here.time_s) <= _SNAP_S:
             found[waiting[0]] = maker.at(before, here, None)
-    except (ParseError, ValueError, OSError, KeyError) as error:
+    except (ParseError, ValueError, OSError, EOFError, KeyError) as error:
         reason = f"something in it lacks {error}" if isinstance(error, KeyError) else str(error)
         raise TrafficError(f"{path} is no readable fcd-output of SUMO: {reason}.", path) from error
     missing = [time for time in times_s if time not in found]
@@ -222,17 +223,25 @@ def read_fcd(
 
 def _steps(file: Path) -> Iterator[_Step]:
     root: Any = None
-    for event, element in iterparse(file, events=("start", "end")):
-        if root is None:
-            root = element
-        if event == "end" and element.tag == "timestep":
-            items = {
-                item.attrib["id"]: (item.tag, dict(item.attrib))
-                for item in element
-                if item.tag in ("vehicle", "person") and not item.get("vehicle")
-            }
-            yield _Step(float(element.get("time", "nan")), items)
-            root.clear()  # what was read would stay in memory
+    with _opened(file) as stream:
+        for event, element in iterparse(stream, events=("start", "end")):
+            if root is None:
+                root = element
+            if event == "end" and element.tag == "timestep":
+                items = {
+                    item.attrib["id"]: (item.tag, dict(item.attrib))
+                    for item in element
+                    if item.tag in ("vehicle", "person") and not item.get("vehicle")
+                }
+                yield _Step(float(element.get("time", "nan")), items)
+                root.clear()  # what was read would stay in memory
+
+
+def _opened(file: Path) -> IO[bytes]:
+    """Return a file opened to be read, unpacked where SUMO packed it."""
+    with file.open("rb") as stream:
+        packed = stream.read(2) == b"\x1f\x8b"
+    return cast("IO[bytes]", gzip.open(file)) if packed else file.open("rb")
 
 
 def _check_places(frames: Sequence[TrafficFrame], network: RoadNetwork, path: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import math
 from pathlib import Path
 
@@ -97,6 +98,15 @@ def test_lanes_change_half_way_and_edges_where_they_end(network: RoadNetwork, tm
     file = fcd(tmp_path, {0.0: [car(10, 0, more=there[0])], 1.0: [car(18, 2, more=there[1])]})
     lanes = [only(read_fcd(file, network, times_s=[time], types={})).lane for time in (0.4, 0.6)]
     assert lanes == ["main_0", "main_1"]
+
+
+def test_a_packed_run_is_read_and_a_broken_one_refused(network: RoadNetwork, tmp_path: Path) -> None:
+    packed = gzip.compress(fcd(tmp_path, {0.0: [car(7, 0)]}).read_bytes())
+    (tmp_path / "fcd.xml.gz").write_bytes(packed)
+    assert only(read_fcd(tmp_path / "fcd.xml.gz", network, times_s=[0.0], types={})).front_m[0] == 7
+    (tmp_path / "fcd.xml.gz").write_bytes(packed[:-12])
+    with pytest.raises(TrafficError, match="no readable fcd-output"):
+        read_fcd(tmp_path / "fcd.xml.gz", network, times_s=[5.0], types={})
 
 
 def test_who_is_there_at_one_step_only_is_not_there_between(network: RoadNetwork, tmp_path: Path) -> None:
