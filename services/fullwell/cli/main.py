@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 
 import typer
@@ -19,7 +20,9 @@ app = typer.Typer(
 )
 
 
+@functools.cache
 def _register() -> None:
+    """Add the commands to the application, once in a process."""
     from fullwell.cli import assets, bench, doctor, local, measure, service
 
     for module in (local, measure, service, assets, doctor, bench):

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+
+from commands import fullwell
 
 RECIPE = """
 schema: fullwell/recipe/v1
@@ -27,11 +27,6 @@ cameras:
 quality: {samples_per_pixel: 2, max_depth: 3}
 vary: {grid: {seed: [1, 2, 3]}}
 """
-
-
-def fullwell(*words: object) -> subprocess.CompletedProcess[str]:
-    code = "import sys; from fullwell.cli.main import main; sys.exit(main())"
-    return subprocess.run([sys.executable, "-c", code, *map(str, words)], capture_output=True, text=True, check=False)
 
 
 @pytest.fixture

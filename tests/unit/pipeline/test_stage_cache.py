@@ -19,11 +19,13 @@ import numpy as np
 import pytest
 
 import fullwell.pipeline.frame as frame_module
+from commands import fullwell
 from fullwell.core.errors import ConflictError, FieldError, RenderError, StorageError
 from fullwell.core.settings import load_settings
 from fullwell.dataset import encode
 from fullwell.pipeline import LightCache, StageStore, plan_frame, render_frame, with_cache_steps
 from fullwell.pipeline import cache as cache_module
+from fullwell.pipeline import run as run_module
 from fullwell.pipeline.cache import decode_light, encode_light, obtain_light, stored_light_key
 from fullwell.radiometry import WavelengthGrid
 from fullwell.render import RenderedLight, RenderStatistics
@@ -526,15 +528,21 @@ def test_negative_cache_size_is_refused_by_name(monkeypatch: pytest.MonkeyPatch)
         load_settings()
 
 
-def test_render_command_keeps_light_between_runs_unless_told_not_to(recipe: dict[str, Any], tmp_path: Path) -> None:
+def test_render_command_keeps_light_between_runs_unless_told_not_to(
+    recipe: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     file = tmp_path / "ball.json"
     file.write_text(json.dumps(recipe | {"outputs": ["raw.npz"]}))
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("FULLWELL_")}
 
     def sources(folder: str, *words: str, **extra: str) -> list[str]:
-        code = "import sys; from fullwell.cli.main import main; sys.exit(main())"
-        command = [sys.executable, "-c", code, "render", str(file), "-o", str(tmp_path / folder), "--json", *words]
-        done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment | extra)
+        with monkeypatch.context() as patch:
+            patch.setattr(run_module, "_process_cache", LightCache())  # as in a process of its own
+            for name in [name for name in os.environ if name.startswith("FULLWELL_")]:
+                patch.delenv(name)
+            for name, value in extra.items():
+                patch.setenv(name, value)
+            done = fullwell("render", file, "-o", tmp_path / folder, "--json", *words)
+        assert done.returncode == 0, done.stderr
         return [entry["source"] for frame in json.loads(done.stdout)["frames"] for entry in frame["cache"]]
 
     kept = ("--cache", str(tmp_path / "kept"))
