@@ -15,12 +15,14 @@ from fullwell.core import FieldError
 from fullwell.radiometry import Spectrum, WavelengthGrid
 from fullwell.render import LightRequest, MotionRequest, SamplingGoal, activate, count_moments, render_light
 from fullwell.scene import (
+    BeamPattern,
     Camera,
     ConstantEnvironment,
     Cube,
     Diffuse,
     Emission,
     Film,
+    GoniometricLight,
     Lens,
     Part,
     Rectangle,
@@ -241,6 +243,19 @@ def test_a_scene_at_its_own_time_is_the_very_scene() -> None:
     assert scene_at(SHINING, {"card": TO_THE_RIGHT}, 0.0) is SHINING
     assert scene_at(SHINING, {"card": AT_REST, "other": TO_THE_RIGHT}, 1.0).objects == SHINING.objects
     assert camera_at(view, AT_REST, 1.0) is view
+
+
+def test_lamps_with_a_pattern_turn_with_the_object_that_carries_them() -> None:
+    pattern = BeamPattern(np.ones((2, 2), dtype=np.float32), (-10.0, 10.0), (-10.0, 10.0))
+    lamp = GoniometricLight((2.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), pattern, Spectrum.constant(1.0), carrier="car")
+    other = replace(lamp, carrier="")
+    quarter = Motion(np.array([0.0, 4.0, 0.0]), math.pi / 2, np.zeros(3))
+    moved = scene_at(SceneDescription((), (lamp, other)), {"car": quarter}, 1.0)
+    assert moved.lights[1] is other
+    assert isinstance(moved.lights[0], GoniometricLight)
+    assert moved.lights[0].position_m == pytest.approx((0.0, 6.0, 1.0))
+    assert moved.lights[0].forward == pytest.approx((0.0, 1.0, 0.0))
+    assert moved.lights[0].up == pytest.approx((0.0, 0.0, 1.0))
 
 
 def test_an_automatic_exposure_is_found_from_the_still_scene(still: NDArray[np.float64]) -> None:
