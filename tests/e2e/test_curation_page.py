@@ -30,7 +30,7 @@ from fullwell.storage import store_from_url
 from servers import missing
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Browser, Locator, Page
 
 pytestmark = [pytest.mark.service, pytest.mark.slow]
 
@@ -122,6 +122,16 @@ def wait_for_query(page: Page, **wanted: str | None) -> None:
         page.wait_for_function("([name, value]) => new URLSearchParams(location.search).get(name) === value", arg=[name, value])
 
 
+def wait_for_search(page: Page, text: str) -> None:
+    """Wait until the search's field holds this text."""
+    page.wait_for_function("text => document.querySelector('.fw-search input')?.value === text", arg=text)
+
+
+def disabled(inside: Locator, name: str) -> None:
+    """Wait until a button of that name is there and cannot be used."""
+    inside.get_by_role("button", name=name, disabled=True).first.wait_for()
+
+
 def model_file(folder: Path) -> Path:
     """Make a GLB of a car of 4.2 m with parts that have names and colours, z up and facing +x as glTF would not have it."""
     scene = trimesh.Scene()
@@ -185,9 +195,9 @@ def test_a_dropped_model_is_previewed_approved_by_keyboard_and_drawn_by_a_recipe
         tags.press("Enter")
         page.locator(".fw-dialog").get_by_role("button", name="Import").click()
 
-        row = page.locator("[data-upload='little red car.glb']")
-        page.locator("[data-upload].done").wait_for(timeout=IMPORT_MS)
-        assert "waits for a decision" in row.inner_text()
+        row = page.locator("[data-upload='little red car.glb'].done")
+        row.wait_for(timeout=IMPORT_MS)
+        row.get_by_text("waits for a decision").first.wait_for()
 
         page.locator(".tab-pending").click()
         page.locator(".fw-facets").get_by_text("little").click()
@@ -195,18 +205,19 @@ def test_a_dropped_model_is_previewed_approved_by_keyboard_and_drawn_by_a_recipe
         shown(page, 1)
         picture = page.locator(".fw-card img")
         picture.wait_for()
-        page.wait_for_function("() => document.querySelector('.fw-card img').naturalWidth > 100")
+        page.wait_for_function("() => document.querySelector('.fw-card img')?.naturalWidth > 100")
 
         page.locator(".fw-card-open").click()
         page.locator(".fw-stage canvas").wait_for()
         page.locator(".fw-viewer-note").wait_for(state="detached")
         page.locator(".fw-dim").get_by_text("4.20 m").wait_for()
+        page.locator(".fw-table tr.pick").nth(5).wait_for()
         assert page.locator(".fw-table tr.pick").count() == 6
         page.get_by_role("tab", name="Turntable").click()
         page.wait_for_function("() => document.querySelectorAll('.fw-turn img').length === 8")
         page.locator(".fw-turn").focus()
         page.keyboard.press("ArrowRight")
-        page.wait_for_function("() => document.querySelector('.fw-turn').getAttribute('aria-valuenow') === '2'")
+        page.wait_for_function("() => document.querySelector('.fw-turn')?.getAttribute('aria-valuenow') === '2'")
         page.locator("body").click(position={"x": 5, "y": 500})
 
         page.keyboard.press("a")
@@ -248,8 +259,8 @@ def test_a_file_that_is_no_model_is_refused_with_its_reason(browser: Browser, tm
         choose(page, "Licence", "CC0-1.0")
         page.locator(".fw-dialog").get_by_role("button", name="Import").click()
         page.locator("[data-upload='broken.glb'].failed").wait_for(timeout=IMPORT_MS)
-        assert "broken.glb" in page.locator(".fw-tray-note").inner_text()
-        assert page.get_by_role("button", name="Retry").is_visible()
+        page.locator(".fw-tray-note").get_by_text("broken.glb").wait_for()
+        page.get_by_role("button", name="Retry").wait_for()
 
 
 def test_the_grid_loads_as_it_is_scrolled_and_opens_again_where_it_was_left(
@@ -265,8 +276,8 @@ def test_the_grid_loads_as_it_is_scrolled_and_opens_again_where_it_was_left(
         page.go_back()
         wait_for_query(page, asset=None)
         page.wait_for_function(
-            "() => { const box = document.querySelector('[data-id=car-70]').getBoundingClientRect();"
-            " return box.top > -box.height && box.top < innerHeight; }"
+            "() => { const box = document.querySelector('[data-id=car-70]')?.getBoundingClientRect();"
+            " return box && box.top > -box.height && box.top < innerHeight; }"
         )
 
 
@@ -288,13 +299,13 @@ def test_filters_are_in_the_address_and_the_back_button_takes_them_back(
         shared = page.url
         page.go_back()
         wait_for_query(page, q=None, length=":4.1")
-        assert page.locator(".fw-search input").input_value() == ""
+        wait_for_search(page, "")
         page.go_back()
         wait_for_query(page, length=None)
         shown(page, CARS // 2)
         page.goto(shared)
         shown(page, 1)
-        assert page.locator(".fw-search input").input_value() == "car 03"
+        wait_for_search(page, "car 03")
         page.locator(".fw-active .clear").click()
         wait_for_query(page, q=None, tag=None, length=None, state="all")
 
@@ -384,17 +395,17 @@ def test_another_material_makes_a_version_that_can_be_compared(browser: Browser,
         page.keyboard.press("c")
         wait_for_query(page, compare="1")
         page.get_by_text("Version 1 beside version 2: 1 difference").wait_for()
-        assert "part bumper" in page.locator("tr.differs").inner_text()
+        page.locator("tr.differs").filter(has_text="part bumper").wait_for()
         page.keyboard.press("Escape")
         page.locator(".fw-versions").get_by_role("button", name="Version 1").click()
         page.get_by_text("This is version 1.").wait_for()
-        assert page.get_by_role("button", name="Change").is_disabled()
+        disabled(page.locator("body"), "Change")
 
 
 def test_an_asset_that_is_not_there_is_told_with_the_nearest(browser: Browser, cars: tuple[str, AssetLibrary]) -> None:
     with page_of(browser, cars[0], "?asset=car-099") as (page, _):
         page.get_by_text("cannot be shown").wait_for()
-        assert "car-0" in page.locator(".fw-detail").inner_text()
+        page.locator(".fw-detail").filter(has_text="car-0").wait_for()
 
 
 def test_text_of_an_asset_is_never_taken_for_markup(browser: Browser, cars: tuple[str, AssetLibrary]) -> None:
@@ -402,8 +413,8 @@ def test_text_of_an_asset_is_never_taken_for_markup(browser: Browser, cars: tupl
         page.get_by_text(HOSTILE).wait_for()
         page.locator(".fw-card-open").click()
         page.locator(".fw-spectrum svg").wait_for()
-        assert page.get_by_role("heading", name=HOSTILE).is_visible()
-        assert page.locator(".fw-events").get_by_text(HOSTILE).is_visible()
+        page.get_by_role("heading", name=HOSTILE).wait_for()
+        page.locator(".fw-events").get_by_text(HOSTILE).wait_for()
         assert page.locator("a[href^=javascript]").count() == 0
         page.keyboard.press("a")
         page.locator(".fw-dialog").get_by_text(HOSTILE).first.wait_for()
@@ -420,8 +431,8 @@ def test_a_phone_shows_everything_in_one_column(browser: Browser, cars: tuple[st
         page.locator(".fw-side").wait_for(state="hidden")
         page.locator(".fw-card-open").first.click()
         page.locator(".fw-stage canvas").wait_for()
+        page.locator(".fw-decision").get_by_role("button", name="Approve").wait_for()
         assert page.evaluate("document.documentElement.scrollWidth") == 390
-        assert page.locator(".fw-decision").get_by_role("button", name="Approve").is_visible()
 
 
 def test_the_theme_follows_the_system_and_can_be_switched(browser: Browser, cars: tuple[str, AssetLibrary]) -> None:
@@ -461,10 +472,10 @@ def test_a_key_decides_who_sees_and_who_changes(browser: Browser, tmp_path: Path
         page.get_by_label("Key", exact=True).fill("just-looking")
         page.locator(".fw-dialog").get_by_role("button", name="Sign in").click()
         shown(page, 1)
-        assert page.get_by_role("button", name="Import").is_disabled()
-        assert "may look only" in str(page.get_by_role("button", name="Import").get_attribute("title"))
+        disabled(page.locator("body"), "Import")
+        page.get_by_role("button", name="Import").and_(page.locator("[title*='may look only']")).wait_for()
         page.locator(".fw-card-open").click()
-        assert page.locator(".fw-decision").get_by_role("button", name="Approve").is_disabled()
+        disabled(page.locator(".fw-decision"), "Approve")
         page.keyboard.press("a")
         page.get_by_text("may look only").first.wait_for()
 

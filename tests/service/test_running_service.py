@@ -103,6 +103,8 @@ def test_messages_that_come_twice_run_nothing_twice(worker: RunningService) -> N
     queue.enqueue("j0", [0])
     wait_for(lambda: queue.waiting() == 0, what="the end of the duplicates")
     queue.close()
+    last = client.submit(tiny_recipe(1))  # the worker takes it after them: then they have done what they do
+    assert client.wait(last.id, timeout_s=60).state == "done"
     assert outcomes(client, job.id, 3) == [["done"]] * 3
 
 
