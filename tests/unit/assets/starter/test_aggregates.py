@@ -120,4 +120,5 @@ def test_levels_stand_in_the_manifest_with_growing_errors() -> None:
     assert errors == sorted(errors)
     # A piece of a level is never larger than twice what is said to be lost.
     pieces = [level.grain_m for level in built("birch-02").coarser]
-    assert all(error >= grain for error, grain in zip(errors[1:], pieces, strict=True))
+    micrometre = 1e-6  # errors are rounded to it
+    assert all(error >= grain - micrometre for error, grain in zip(errors[1:], pieces, strict=True))
