@@ -20,7 +20,7 @@ ROWS, COLS = 36, 48
 def street_recipe() -> dict[str, Any]:
     sensor = {"name": "s", "model": "imx363", "rows": ROWS, "cols": COLS, "exposure": {"time_s": 0.001}}
     lens = {"kind": "pinhole", "hfov_deg": 70, "f_number": 4}
-    cars = {"rate_per_s": 0.3, "density_per_km": 15}
+    cars = {"rate_per_s": 0.6, "density_per_km": 30}
     traffic = {"network": {"layout": "cross", "length_m": 160}, "demand": {"car": cars}, "time_s": 30, "ego": {"kind": "car"}}
     sky = {"name": "sky", "kind": "constant_environment", "luminance_cd_m2": 3000, "spd": "D65"}
     return {
