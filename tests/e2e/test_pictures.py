@@ -31,6 +31,7 @@ def fill_store(home: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1500)
 def test_pictures_of_all_examples_can_be_made(tmp_path: Path) -> None:
     script = ROOT / "examples" / "make_pictures.py"
     home = tmp_path / "home"
