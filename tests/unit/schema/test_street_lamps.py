@@ -101,6 +101,14 @@ def test_lanterns_whose_lenses_stand_upright_shine_to_all_sides() -> None:
     assert emission.pattern is None
 
 
+def test_floodlights_of_billboards_are_no_street_lights() -> None:
+    item = replace(placed("light", "street_light"), role="furniture")
+    assert (
+        bright_as_its_kind(emitted("lamp/street_led"), "lamp/street_led", lens("lamp", 0.3, 2, (0, 0, -1)), item).pattern
+        is None
+    )
+
+
 def test_cars_have_led_or_halogen_headlamps_by_the_seed() -> None:
     cars = [replace(placed("sedan", "car"), id=f"car{n}") for n in range(200)]
     drawn = [lamp_material("lamp/headlight_led", car, document(), 5) for car in cars]

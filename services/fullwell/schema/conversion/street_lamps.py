@@ -95,7 +95,7 @@ def bright_as_its_kind(emission: Emission, lamp: str, part: LoadedPart, item: Pl
             return emission
         given = float(np.clip(luminance * ahead, *limits)) / ahead
     change = float(np.clip(given / luminance, 1 / _LARGEST_CHANGE, _LARGEST_CHANGE))
-    pattern = luminaire_pattern(corners) if lamp.startswith("lamp/street_") else None
+    pattern = luminaire_pattern(corners) if lamp.startswith("lamp/street_") and item.role == "light" else None
     return Emission(emission.radiance.scaled(change), emission.group, pattern)
 
 
