@@ -74,7 +74,7 @@ RECIPE: dict[str, Any] = {
         }
     },
     "outputs": ["image.png", "raw.npz", "labels.json"],
-    "quality": {"noise_ratio": 1.5, "max_samples_per_pixel": 128, "max_depth": 5},
+    "quality": {"noise_ratio": 1.5, "max_samples_per_pixel": 512, "max_depth": 5},
 }
 
 

@@ -8,6 +8,7 @@ Run: python examples/make_pictures.py [--quick] [--only TEXT] [FOLDER]   (defaul
 from __future__ import annotations
 
 import io
+import json
 import sys
 import tempfile
 from pathlib import Path
@@ -47,18 +48,30 @@ def make(recipe: Path, target: Path, *, overrides: dict[str, str]) -> None:
         assets = assets_of_settings(load_settings())
         document = pin_assets(document, assets)
     builder, cache = RecipeBuilder(document, base_dir=document.base_dir, assets=assets), LightCache()
-    captions: list[str] = []
+    varied: list[dict[str, object]] = []
     with tempfile.TemporaryDirectory() as folder:
         store = LocalStore(Path(folder))
         for index in range(document.frame_count()):
             frame = builder.frame(index)  # one at a time: eight streets do not fit into the memory of a small machine
             render_frame(frame, store, f"{index}", cache=cache)
-            captions.append(", ".join(f"{path.rpartition('.')[2]} {value}" for path, value in frame.varied))
+            varied.append(dict(frame.varied))
         first = {info.key.partition("/")[2]: store.get(info.key) for info in store.list("0/")}
-        images = [Image.open(io.BytesIO(first_picture(store, f"{index}/"))) for index in range(len(captions))]
+        images = [Image.open(io.BytesIO(first_picture(store, f"{index}/"))) for index in range(len(varied))]
     save(picture_of_products(first, f"{document.name}, frame 0"), target / f"{recipe.stem}.png")
-    if len(captions) > 1:
-        save(strip(images, captions), target / f"{recipe.stem}_frames.jpg")
+    if len(varied) > 1:
+        save(strip(images, [caption_of(values, varied) for values in varied]), target / f"{recipe.stem}_frames.jpg")
+
+
+def caption_of(values: dict[str, object], of_all: list[dict[str, object]]) -> str:
+    """Return what a frame varies; of mappings the entries that are not the same in all frames."""
+    words = []
+    for path, value in values.items():
+        if not str(value).startswith("{"):
+            words.append(f"{path.rpartition('.')[2]} {value}")
+            continue
+        mappings = [json.loads(str(other[path])) for other in of_all]
+        words += [f"{k} {v:g}" for k, v in json.loads(str(value)).items() if any(other.get(k) != v for other in mappings)]
+    return ", ".join(words)
 
 
 def first_picture(store: LocalStore, prefix: str) -> bytes:
