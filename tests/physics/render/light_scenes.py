@@ -125,8 +125,13 @@ class Lit:
         """(lanes,) what the sample brings in the cell."""
         import drjit as dr
 
-        lanes = dr.width(sample.pdf)
-        return np.asarray(sample.radiance(self.spectra, [dr.full(self.mi.UInt32, CELL, lanes)])[0].numpy(), dtype=float)
+        cells = [dr.full(self.mi.UInt32, CELL, dr.width(sample.pdf))]
+        found = sample.radiance(self.spectra, cells)[0].numpy()
+        if "environment" in self.lights.features:
+            of_dome = sample.dome & (sample.pdf > 0)
+            far = self.lights.environment_radiance(self.spectra, sample.direction, cells, of_dome)[0].numpy()
+            found = np.where(of_dome.numpy(), far, found)
+        return np.asarray(found, dtype=float)
 
     def contributions(self, point: Any, normal: Any, lanes: int = 2**16, seed: int = 1) -> NDArray[np.float64]:
         """(lanes,) estimates of the irradiance; of the fluence where there is no normal."""
@@ -134,7 +139,20 @@ class Lit:
         pdf = np.asarray(sample.pdf.numpy(), dtype=float)
         cosine = np.maximum(sample.direction.numpy().T @ np.asarray(normal, dtype=float), 0.0) if np.any(normal) else 1.0
         found = pdf > 0
-        return np.where(found, self.radiance(sample) * cosine / np.where(found, pdf, 1.0), 0.0)
+        of_chosen = np.where(found, self.radiance(sample) * cosine / np.where(found, pdf, 1.0), 0.0)
+        return of_chosen + self.of_sun(normal, lanes, seed) if "sun" in self.lights.features else of_chosen
+
+    def of_sun(self, normal: Any, lanes: int, seed: int = 1) -> NDArray[np.float64]:
+        """(lanes,) estimates of the sun's part."""
+        import drjit as dr
+
+        mi = self.mi
+        rng = np.random.default_rng(seed)
+        direction, density = self.lights.sample_sun(mi.Point2f(*rng.random((2, lanes), dtype=np.float32)))
+        radiance = self.lights.sun_radiance(self.spectra, [dr.full(mi.UInt32, CELL, lanes)])[0].numpy()
+        pdf = np.asarray(density.numpy(), dtype=float)
+        cosine = np.maximum(direction.numpy().T @ np.asarray(normal, dtype=float), 0.0) if np.any(normal) else 1.0
+        return np.where(pdf > 0, radiance * cosine / np.where(pdf > 0, pdf, 1.0), 0.0)
 
     def irradiance(self, point: Any, normal: Any = UP, lanes: int = 2**16) -> float:
         """Mean of the estimates."""

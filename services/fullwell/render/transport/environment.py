@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fullwell.radiometry.spectrum import Spectrum
 from fullwell.radiometry.upsample import reflectance_from_linear_srgb
 from fullwell.render.transport.upload import upload
-from fullwell.render.transport.wavelengths import CELL_COUNT, SpectraTable, cell_means, look_up
+from fullwell.render.transport.wavelengths import PACKET, SpectraOnDevice, SpectraTable, cell_means
 from fullwell.scene import ImageEnvironment, SunSky
 
 __all__ = ["DomeMap", "MapOnDevice", "SunDisk", "SunOnDevice", "image_map", "sun_and_sky"]
@@ -22,7 +22,6 @@ Array = NDArray[np.float64]
 _SAMPLING_ROWS, _SAMPLING_COLS = 256, 512
 """Every map is sampled by cells of this grid, whatever its own size, so that one kernel serves all maps."""
 
-_PACKET = 4
 _SKY_ROWS, _SKY_COLS = 128, 256
 _LOWEST_SUN_SINE = 1e-5
 """A sun exactly on the horizon is 2 arc seconds above."""
@@ -37,8 +36,8 @@ class DomeMap:
     coefficients
         (rows, cols, components), row 0 about the zenith, columns counter-clockwise about +z; bilinear between the middles of
         its pixels.
-    spectra
-        (components,) rows of the scene's table.
+    packet
+        Of the scene's table of spectra: the first of those that hold the components' spectra.
     azimuth_rad
         Where column 0 begins, counter-clockwise from +x.
     split
@@ -46,7 +45,7 @@ class DomeMap:
     """
 
     coefficients: NDArray[np.float32]
-    spectra: NDArray[np.uint32]
+    packet: int
     azimuth_rad: float = 0.0
     split: bool = False
 
@@ -69,10 +68,10 @@ def image_map(light: ImageEnvironment, spectra: SpectraTable) -> DomeMap:
     cells = np.stack([cell_means(curve) for curve in curves]).astype(np.float64)
     cells /= cells.sum(axis=0)
     power = cell_means(light.radiance).astype(np.float64)
-    rows = [spectra.add_cells((curve * power).astype(np.float32)) for curve in cells]
+    packet = spectra.add_packets([(curve * power).astype(np.float32) for curve in cells])
     # The middle of an image lies towards its azimuth, its right side clockwise of it: seen from inside.
     pixels = np.maximum(np.asarray(light.pixels, dtype=np.float32)[:, ::-1], 0.0)
-    return DomeMap(pixels, np.array(rows, dtype=np.uint32), np.radians(light.azimuth_deg) - np.pi)
+    return DomeMap(pixels, packet, np.radians(light.azimuth_deg) - np.pi)
 
 
 def sun_and_sky(light: SunSky, spectra: SpectraTable) -> tuple[DomeMap | None, SunDisk | None]:
@@ -80,16 +79,16 @@ def sun_and_sky(light: SunSky, spectra: SpectraTable) -> tuple[DomeMap | None, S
     x, y, z = (float(v) for v in np.asarray(light.sun_direction, dtype=np.float64) / np.linalg.norm(light.sun_direction))
     sky = _clear_sky((x, y, max(_LOWEST_SUN_SINE, z)), float(light.turbidity), float(light.ground_albedo))
 
-    def row_of(values: Array, weight: float) -> int:
-        return spectra.add(Spectrum(sky.wavelength_nm, values * weight, outside="zero"))
+    def cells_of(values: Array, weight: float) -> NDArray[np.float32]:
+        return cell_means(Spectrum(sky.wavelength_nm, values * weight, outside="zero"))
 
     dome = sun = None
     if light.sky_weight > 0:
-        rows = [row_of(component, light.sky_weight) for component in sky.basis]
-        dome = DomeMap(sky.coefficients, np.array(rows, dtype=np.uint32), split=True)
+        packet = spectra.add_packets([cells_of(component, light.sky_weight) for component in sky.basis])
+        dome = DomeMap(sky.coefficients, packet, split=True)
     if light.sun_weight > 0:
         direction = np.asarray(sky.sun_direction, dtype=np.float64)
-        row = row_of(sky.sun_radiance, light.sun_weight)
+        row = spectra.add_cells(cells_of(sky.sun_radiance, light.sun_weight))
         sun = SunDisk(direction / np.linalg.norm(direction), float(sky.sun_radius_rad), row)
     return dome, sun
 
@@ -140,13 +139,11 @@ class MapOnDevice:
 
         self._mi, self._dr, self._four = mi, dr, dr.llvm.ad.Array4f
         rows, cols, components = dome.coefficients.shape
-        packets = -(-components // _PACKET)
-        padded = np.zeros((rows, cols, packets * _PACKET), dtype=np.float32)
+        packets = -(-components // PACKET)
+        padded = np.zeros((rows, cols, packets * PACKET), dtype=np.float32)
         padded[..., :components] = dome.coefficients
         self._coefficients = upload(mi.Float, padded)
-        names = np.full(packets * _PACKET, SpectraTable.BLACK, dtype=np.uint32)
-        names[:components] = dome.spectra
-        self._spectra = upload(mi.UInt32, names)
+        self._first = dr.opaque(mi.UInt32, dome.packet)
         self._packets = dr.opaque(mi.UInt32, packets)
         self._rows, self._cols = dr.opaque(mi.Int32, rows), dr.opaque(mi.Int32, cols)
         # Rows of the upper part end, and those of the lower part begin, at the horizon of a split map.
@@ -207,23 +204,20 @@ class MapOnDevice:
         around = (dr.atan2(direction.y, direction.x) - self._azimuth) * (0.5 / np.pi)
         return dr.clip(down, 0.0, 1.0), around - dr.floor(around)
 
-    def radiance(self, spectra_device: Any, direction: Any, cells: list[Any], active: Any) -> Any:
+    def radiance(self, spectra: SpectraOnDevice, direction: Any, cells: list[Any], active: Any) -> Any:
         """Return the radiance from a direction at a path's wavelengths."""
         dr, mi = self._dr, self._mi
         corners = self._corners(direction)
         width = dr.width(direction.x)
-        wavelengths = len(cells)
 
         def step(packet: Any, sums: list[Any], going: Any) -> tuple[Any, list[Any], Any]:
             mixed = dr.zeros(self._four, width)
             for pixel, weight in corners:
-                place = pixel * self._packets + packet
-                mixed = mixed + dr.gather(self._four, self._coefficients, place, going) * weight
-            for component in range(_PACKET):
-                row = dr.gather(mi.UInt32, self._spectra, packet * _PACKET + component, going)
-                for k in range(wavelengths):
-                    value = dr.gather(mi.Float, spectra_device, row * CELL_COUNT + cells[k], going)
-                    sums[k] = dr.fma(mixed[component], value, sums[k])
+                mixed += dr.gather(self._four, self._coefficients, pixel * self._packets + packet, going) * weight
+            sums = [
+                total + dr.dot(mixed, spectra.packet(self._first + packet, cell, going))
+                for total, cell in zip(sums, cells, strict=True)
+            ]
             packet = packet + 1
             return packet, sums, going & (packet < self._packets)
 
@@ -298,7 +292,3 @@ class SunOnDevice:
     def density(self, direction: Any) -> Any:
         """Return the density [sr^-1] with which `sample` chooses a direction."""
         return self._dr.select(self.holds(direction), self._inverse_sr, 0.0)
-
-    def radiance(self, spectra_device: Any, direction: Any, cells: list[Any]) -> Any:
-        """Return the disk's radiance, 0 beside it."""
-        return self._dr.select(self.holds(direction), look_up(self._mi, spectra_device, self.row, cells), 0.0)

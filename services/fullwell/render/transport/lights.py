@@ -27,7 +27,7 @@ from fullwell.render.transport.light_tree import LeafBounds, TreeWalk, build_lig
 from fullwell.render.transport.patterns import PatternTable, pattern_bounds
 from fullwell.render.transport.surfaces import CurvedShape, PlacedPattern, SceneSurfaces
 from fullwell.render.transport.upload import upload
-from fullwell.render.transport.wavelengths import SpectraTable, look_up
+from fullwell.render.transport.wavelengths import PACKET, SpectraOnDevice, SpectraTable, look_up
 from fullwell.scene import (
     ConstantEnvironment,
     DirectionalLight,
@@ -45,7 +45,7 @@ __all__ = ["LightSample", "LightSet"]
 Array = NDArray[np.float64]
 
 _EVEN_SHARE = 0.4
-"""Share of the choices that goes evenly to lamps, environment, sun and distant lights, whatever their estimated light: which
+"""Share of the choices that goes evenly to lamps, environment and distant lights, whatever their estimated light: which
 of them is hidden from a point is not known."""
 
 _EVEN_SHARE_DISTANT = 0.1
@@ -78,6 +78,8 @@ class LightSample:
         Whether the light is a point, a spot or directional.
     group
         Light group.
+    dome
+        Whether the direction is one to the environment, whose radiance is `LightSet.environment_radiance`.
     """
 
     direction: Any
@@ -86,14 +88,18 @@ class LightSample:
     pdf: Any
     delta: Any
     group: Any
+    dome: Any
     _row: Any
     _scale: Any
-    _dome: Any
-    _lights: LightSet
+    _mi: Any
+    _dr: Any
 
-    def radiance(self, spectra_device: Any, cells: list[Any]) -> Any:
-        """Return what is to be divided by `pdf`: radiance, intensity / distance^2 of a point, irradiance of a distant light."""
-        return self._lights._radiance(self, spectra_device, cells)
+    def radiance(self, spectra: SpectraOnDevice, cells: list[Any]) -> Any:
+        """Return what is to be divided by `pdf`: radiance, intensity / distance^2 of a point, irradiance of a distant light.
+
+        0 where the direction is one to the environment.
+        """
+        return self._dr.select(self.pdf > 0, look_up(self._mi, spectra, self._row, cells) * self._scale, 0.0)
 
 
 class LightSet:
@@ -104,7 +110,7 @@ class LightSet:
     features
         Kinds of light there are; code for others is not traced. "dome", beside "environment", stands for a constant one.
     count
-        Number of lights that can be chosen.
+        Number of lights that `sample` chooses from: all but the sun, which has `sample_sun`.
     """
 
     features: frozenset[str]
@@ -158,7 +164,8 @@ class LightSet:
                 self._dome_row = dr.opaque(mi.UInt32, collected.dome_row)
                 irradiance["environment"] = total / 4.0
         if collected.map is not None:
-            powers = np.array([collected.power(int(row)) for row in collected.map.spectra])
+            first, components = collected.map.packet * PACKET, collected.map.coefficients.shape[-1]
+            powers = np.array([collected.power(first + component) for component in range(components)])
             environment = MapOnDevice(mi, collected.map, powers)
             if environment.total > 0:
                 features.add("environment")
@@ -168,9 +175,7 @@ class LightSet:
             features.add("sun")
             self._sun = SunOnDevice(mi, collected.sun)
             self._sun_group = dr.opaque(mi.UInt32, collected.sun_group)
-            power = collected.power(collected.sun.row) * collected.sun_weight
-            irradiance["sun"] = power * self._sun.solid_angle_sr / 4.0
-        self.count += len(features & {"environment", "sun"})
+        self.count += len(features & {"environment"})
 
     def _set_distant(self, distant: list[_Distant]) -> float:
         mi, dr = self._mi, self._dr
@@ -191,7 +196,7 @@ class LightSet:
     # Sampling --------------------------------------------------------------------------------------------------------
 
     def sample(self, point: Any, normal: Any, u_select: Any, u: Any, active: Any) -> LightSample:
-        """Choose a light for a point and a direction to it.
+        """Choose a light, other than the sun, for a point and a direction to it.
 
         `normal` (unit) bounds the directions to the half space on its side; a zero vector sets no bound (fog, or a surface
         that lets light through). `u_select` and `u` are uniform in [0, 1).
@@ -206,15 +211,15 @@ class LightSet:
             pdf=dr.zeros(mi.Float, width),
             delta=dr.zeros(mi.Bool, width),
             group=none,
+            dome=dr.zeros(mi.Bool, width),
             _row=none,
             _scale=dr.full(mi.Float, 1.0, width),
-            _dome=dr.zeros(mi.Bool, width),
-            _lights=self,
+            _mi=mi,
+            _dr=dr,
         )
         for kind, choose in (
             ("tree", self._sample_tree),
             ("environment", self._sample_environment),
-            ("sun", self._sample_sun),
             ("distant", self._sample_distant),
         ):
             if kind in self.features:
@@ -260,7 +265,7 @@ class LightSet:
             pdf = dr.select(scale > 0, pdf, 0.0)
         pdf = dr.select(active, pdf * probability * self._share["tree"], 0.0)
         no_dome = dr.zeros(mi.Bool, dr.width(pdf))
-        return LightSample(direction, distance, clearance, pdf, delta, group, row, scale, no_dome, self)
+        return LightSample(direction, distance, clearance, pdf, delta, group, no_dome, row, scale, mi, dr)
 
     def _share_towards(self, number: Any, towards: Any, active: Any) -> Any:
         """Return the share of a lamp's light that goes in a direction; 1 for lamps without a pattern, whose number is 0."""
@@ -277,22 +282,13 @@ class LightSet:
             direction = dr.select(set_, about, mi.warp.square_to_uniform_sphere(u))
         else:
             direction, _ = self._map.sample(u, active)
-        density = self._environment_density(normal, direction, active)
-        return self._from_far(direction, density, self._environment_group, 0, dome=True)
-
-    def _sample_sun(self, point: Any, normal: Any, u_select: Any, u: Any, active: Any) -> LightSample:
-        direction = self._sun.sample(u)
-        density = self._sun_density(direction, active)
-        return self._from_far(direction, density, self._sun_group, self._sun.row, dome=False)
-
-    def _from_far(self, direction: Any, pdf: Any, group: Any, row: Any, *, dome: bool) -> LightSample:
-        """Return the sample of a direction without end to the environment (`dome`), or to the sun with its spectrum's row."""
-        mi, dr = self._mi, self._dr
+            height = dr.dot(normal, direction)
+            direction = dr.select(height < 0, direction - 2.0 * height * normal, direction)
+        density = self.environment_density(normal, direction, active)
         width = dr.width(direction.x)
-        none, far = dr.zeros(mi.UInt32, width), dr.full(mi.Float, dr.inf, width)
-        ones = dr.full(mi.Float, 1.0, width)
-        no, nothing, of_dome = dr.zeros(mi.Bool, width), dr.zeros(mi.Vector3f, width), dr.full(mi.Bool, dome, width)
-        return LightSample(direction, far, nothing, pdf, no, none + group, none + row, ones, of_dome, self)
+        none, far, ones = dr.zeros(mi.UInt32, width), dr.full(mi.Float, dr.inf, width), dr.full(mi.Float, 1.0, width)
+        no, nothing, of_dome = dr.zeros(mi.Bool, width), dr.zeros(mi.Vector3f, width), dr.full(mi.Bool, True, width)
+        return LightSample(direction, far, nothing, density, no, none + self._environment_group, of_dome, none, ones, mi, dr)
 
     def _sample_distant(self, point: Any, normal: Any, u_select: Any, u: Any, active: Any) -> LightSample:
         mi, dr = self._mi, self._dr
@@ -317,15 +313,12 @@ class LightSet:
         pdf = dr.select(active, second.x * self._share["distant"], 0.0)
         far, ones = dr.full(mi.Float, dr.inf, width), dr.full(mi.Float, 1.0, width)
         no, yes, nothing = dr.zeros(mi.Bool, width), dr.full(mi.Bool, True, width), dr.zeros(mi.Vector3f, width)
-        return LightSample(direction, far, nothing, pdf, yes, group, row, ones, no, self)
+        return LightSample(direction, far, nothing, pdf, yes, group, no, row, ones, mi, dr)
 
-    def _radiance(self, sample: LightSample, spectra_device: Any, cells: list[Any]) -> Any:
-        dr = self._dr
-        value = look_up(self._mi, spectra_device, sample._row, cells) * sample._scale
-        if "environment" in self.features:
-            far = self._dome_radiance(spectra_device, sample.direction, cells, sample._dome & (sample.pdf > 0))
-            value = dr.select(sample._dome, far, value)
-        return dr.select(sample.pdf > 0, value, 0.0)
+    def sample_sun(self, u: Any) -> tuple[Any, Any]:
+        """Return a direction to the sun and its density [sr^-1]: each point that is lit looks at it, none has to choose it."""
+        direction = self._sun.sample(u)
+        return direction, self._sun.density(direction)
 
     # What rays meet --------------------------------------------------------------------------------------------------
 
@@ -357,47 +350,51 @@ class LightSet:
             density = dr.select(self._leaves.is_curved(leaf), curved, density)
         return dr.select(active & (probability > 0), density * probability * self._share["tree"], 0.0)
 
-    def escaped(
-        self, spectra_device: Any, origin_normal: Any, direction: Any, cells: list[Any], active: Any
-    ) -> list[tuple[Any, Any, Any]]:
-        """Return [(radiance, density [sr^-1], group)] of what a ray that leaves the scene meets, [] without anything.
+    # Far away --------------------------------------------------------------------------------------------------------
 
-        Environment and sun are two lights, each with the density with which `sample` at a point of that normal would have
-        chosen the direction for it.
-        """
-        dr = self._dr
-        met = []
-        if "environment" in self.features:
-            radiance = self._dome_radiance(spectra_device, direction, cells, active)
-            density = self._environment_density(origin_normal, direction, active)
-            met.append((dr.select(active, radiance, 0.0), density, self._environment_group))
-        if "sun" in self.features:
-            radiance = self._sun.radiance(spectra_device, direction, cells)
-            met.append((dr.select(active, radiance, 0.0), self._sun_density(direction, active), self._sun_group))
-        return met
+    @property
+    def environment_group(self) -> Any:
+        """Group of the environment."""
+        return self._environment_group
 
-    def _dome_radiance(self, spectra_device: Any, direction: Any, cells: list[Any], active: Any) -> Any:
+    def environment_radiance(self, spectra: SpectraOnDevice, direction: Any, cells: list[Any], active: Any) -> Any:
+        """Return the environment's radiance from a direction; only where "environment" is among the features."""
         if "dome" in self.features:
-            return look_up(self._mi, spectra_device, self._dome_row, cells)
-        return self._map.radiance(spectra_device, direction, cells, active)
+            return look_up(self._mi, spectra, self._dome_row, cells)
+        return self._map.radiance(spectra, direction, cells, active)
 
-    def _environment_density(self, origin_normal: Any, direction: Any, active: Any) -> Any:
+    def environment_density(self, normal: Any, direction: Any, active: Any) -> Any:
+        """Return the density [sr^-1] with which `sample` at a point of that normal chooses a direction for the environment."""
         dr = self._dr
         if "dome" in self.features:
-            bound = dr.dot(origin_normal, origin_normal) > _NORMAL_SET
-            cosine = dr.maximum(dr.dot(origin_normal, direction), 0.0)
+            bound = dr.dot(normal, normal) > _NORMAL_SET
+            cosine = dr.maximum(dr.dot(normal, direction), 0.0)
             density = dr.select(bound, cosine / np.pi, 0.25 / np.pi)
         else:
-            density = self._map.density(direction, active)
+            # What was drawn below a surface's horizon is mirrored above it: a wall sees half of the sky.
+            height = dr.dot(normal, direction)
+            above = self._map.density(direction, active & (height >= 0))
+            below = self._map.density(direction - 2.0 * height * normal, active & (height > 0))
+            density = dr.select(height >= 0, above + dr.select(height > 0, below, 0.0), 0.0)
         return dr.select(active, self._share["environment"] * density, 0.0)
 
-    def _sun_density(self, direction: Any, active: Any) -> Any:
-        return self._dr.select(active, self._share["sun"] * self._sun.density(direction), 0.0)
+    @property
+    def sun_group(self) -> Any:
+        """Group of the sun."""
+        return self._sun_group
+
+    def sun_radiance(self, spectra: SpectraOnDevice, cells: list[Any]) -> Any:
+        """Return the radiance of the sun's disk; only where "sun" is among the features."""
+        return look_up(self._mi, spectra, self._sun.row, cells)
+
+    def sun_density(self, direction: Any) -> Any:
+        """Return the density [sr^-1] with which `sample_sun` chooses a direction: 0 beside the disk."""
+        return self._sun.density(direction)
 
 
 def _take(dr: Any, found: LightSample, other: LightSample, chosen: Any) -> None:
     """Put `other` into `found` where `chosen`."""
-    for name in ("direction", "distance", "clearance", "pdf", "delta", "group", "_row", "_scale", "_dome"):
+    for name in ("direction", "distance", "clearance", "pdf", "delta", "group", "dome", "_row", "_scale"):
         setattr(found, name, dr.select(chosen, getattr(other, name), getattr(found, name)))
 
 
@@ -407,7 +404,7 @@ def _shares(mi: Any, dr: Any, irradiance: dict[str, float]) -> tuple[dict[str, A
     start: dict[str, Any] = {}
     share: dict[str, Any] = {}
     begun = 0.0
-    for kind in ("tree", "environment", "sun", "distant"):
+    for kind in ("tree", "environment", "distant"):
         if kind in irradiance:
             estimated = irradiance[kind] / total if 0 < total < np.inf else 1.0 / len(irradiance)
             part = _EVEN_SHARE / len(irradiance) + (1.0 - _EVEN_SHARE) * estimated

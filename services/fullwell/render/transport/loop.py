@@ -25,7 +25,7 @@ _SHADOW_SHARE = 1.0 - 1e-6
 
 _FAR = 3e38
 _CAMERA_PAIRS = 3
-_BOUNCE_PAIRS = 5
+_BOUNCE_PAIRS = 6
 _ROULETTE_START = 2
 
 
@@ -230,6 +230,7 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
     last_density = dr.zeros(mi.Float, lanes)
     single = dr.full(mi.Mask, False, lanes)
     depth = dr.zeros(mi.UInt32, lanes)
+    seen = dr.zeros(mi.Float, lanes)
     eta = dr.full(mi.Float, 1, lanes)
     sums = [[dr.zeros(mi.Float, lanes) for _ in range(self._channels)] for _ in range(self._groups)]
     bad = dr.zeros(mi.UInt32, lanes)
@@ -247,6 +248,7 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
             last_point = mi.Point3f(0)
             single = mi.Mask(False)
             depth = mi.UInt32(0)
+            seen = mi.Float(0)
             eta = mi.Float(1)
         cell_list = [cells[k] for k in range(count)]
         wavelengths_nm = [FIRST_EDGE_NM + CELL_NM * (mi.Float(cell) + 0.5) for cell in cell_list]
@@ -280,13 +282,21 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
                 radiance = self._added(
                     radiance, throughput * look_up(mi, given.tables["spectra"], row, cell_list) * share, group
                 )
-        if not self._lights.features.isdisjoint(("environment", "sun")):
-            escaped = active & ~hit.valid & ~in_fog
-            if escaped:
-                met = self._lights.escaped(given.tables["spectra"], last_normal, direction, cell_list, escaped)
-                for value, other, group in met:
-                    share = dr.select(last_density > 0, last_density / (last_density + other), 1.0)
-                    radiance = self._added(radiance, throughput * value * share, group)
+        # What is far away: the sky is looked up once for each lane, by rays that left the scene and by light sampling alike.
+        escaped = active & ~hit.valid & ~in_fog
+        far_direction = direction
+        far_weight = throughput
+        if "environment" in self._lights.features:
+            other = self._lights.environment_density(last_normal, direction, escaped)
+            share = dr.select(last_density > 0, last_density / (last_density + other), 1.0)
+            far_weight = dr.select(escaped, throughput * share, 0.0)
+        if "sun" in self._lights.features:
+            other = self._lights.sun_density(direction)
+            in_sun = escaped & (other > 0)
+            if in_sun:
+                share = dr.select(last_density > 0, last_density / (last_density + other), 1.0)
+                met = throughput * self._lights.sun_radiance(given.tables["spectra"], cell_list) * share
+                radiance = self._added(radiance, met, self._lights.sun_group)
 
         depth += 1
         alive = active & (hit.valid | in_fog) & (depth < given.tables["max_depth"])
@@ -314,11 +324,31 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
                     shadow = self._shadow_ray(start, hit.point, light)
                     useful &= ~self._geometry.occluded(given.scene, shadow, useful)
                     share = dr.select(light.delta, 1.0, light.pdf / (light.pdf + density))
-                    arriving = light.radiance(given.tables["spectra"], cell_list) * (share / light.pdf)
+                    weight = throughput * value * (share / light.pdf)
                     if self._fog is not None:
-                        arriving = arriving * self._fog.transmittance(start, light.direction, light.distance)
-                    sent = dr.select(useful, throughput * value * arriving, 0.0)
-                    radiance = self._added(radiance, sent, light.group)
+                        weight = weight * self._fog.transmittance(start, light.direction, light.distance)
+                    weight = dr.select(useful, weight, 0.0)
+                    if "environment" in self._lights.features:
+                        far_direction = dr.select(light.dome, light.direction, far_direction)
+                        far_weight = dr.select(light.dome, weight, far_weight)
+                    if not self._lights.features.isdisjoint(("tree", "distant")):
+                        sent = weight * light.radiance(given.tables["spectra"], cell_list)
+                        radiance = self._added(radiance, sent, light.group)
+            if "sun" in self._lights.features:  # noqa: SIM102 - as above
+                if lit:
+                    sunwards, sun_density = self._lights.sample_sun(numbers.pair(first_pair + 5))
+                    value, density = surface.evaluate(wi, frame.to_local(sunwards))
+                    if self._fog is not None:
+                        phase = self._fog.phase(dr.dot(direction, sunwards))
+                        value, density = dr.select(in_fog, phase, value), dr.select(in_fog, phase, density)
+                    useful = lit & (sun_density > 0) & dr.any(value > 0)
+                    start = hit.start(sunwards, mi, dr)
+                    useful &= ~self._geometry.occluded(given.scene, mi.Ray3f(mi.Ray3f(o=start, d=sunwards), _FAR), useful)
+                    weight = throughput * value * dr.rcp(sun_density + density)
+                    if self._fog is not None:
+                        weight = weight * self._fog.transmittance(start, sunwards, mi.Float(dr.inf))
+                    sent = dr.select(useful, weight * self._lights.sun_radiance(given.tables["spectra"], cell_list), 0.0)
+                    radiance = self._added(radiance, sent, self._lights.sun_group)
 
             bounce = surface.sample(wi, choice.y, numbers.pair(first_pair + 2))
             onward = frame.to_world(bounce.wo)
@@ -335,7 +365,12 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
             finished |= alive & ~(strongest > 0)
             # Russian roulette by what is left of the path's weight; radiance in glass is denser by the index squared.
             # A path that lost nothing goes on, to `max_depth`: its end by chance is noise without bound where nothing absorbs.
-            survival = dr.select(depth < _ROULETTE_START, 1.0, dr.minimum(strongest * eta * eta, 1.0))
+            # What counts is what is left of the light of the surface that the camera sees: a black car's pixel is compared with
+            # its own noise, and a path from it must not return with more weight than it had there.
+            left = strongest * eta * eta
+            seen = dr.select(seen > 0, seen, dr.select(bounce.delta & ~in_fog, 0.0, left))
+            survival = dr.minimum(left * dr.rcp(dr.select(seen > 0, seen, 1.0)), 1.0)
+            survival = dr.select(depth < _ROULETTE_START, 1.0, survival)
             finished |= alive & (texture_pair.x >= survival)
             throughput = throughput * dr.rcp(dr.maximum(survival, 1e-6))
             origin = hit.start(onward, mi, dr)
@@ -343,6 +378,12 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
             last_density = next_density
             last_normal = bound
             last_point = hit.point
+
+        if "environment" in self._lights.features:
+            looks = active & (dr.max(far_weight) > 0)
+            if looks:
+                sky = self._lights.environment_radiance(given.tables["spectra"], far_direction, cell_list, looks)
+                radiance = self._added(radiance, far_weight * sky, self._lights.environment_group)
 
         if finished:
             good = dr.full(mi.Mask, True, lanes)

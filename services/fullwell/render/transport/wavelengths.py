@@ -10,13 +10,26 @@ from numpy.typing import NDArray
 from fullwell.radiometry.spectrum import Spectrum
 from fullwell.render.transport.upload import upload
 
-__all__ = ["CELL_COUNT", "CELL_NM", "FIRST_EDGE_NM", "SpectraTable", "cell_centres_nm", "cell_means", "look_up"]
+__all__ = [
+    "CELL_COUNT",
+    "CELL_NM",
+    "FIRST_EDGE_NM",
+    "PACKET",
+    "SpectraOnDevice",
+    "SpectraTable",
+    "cell_centres_nm",
+    "cell_means",
+    "look_up",
+]
 
 FIRST_EDGE_NM = 300.0
 CELL_NM = 0.5
 CELL_COUNT = 1600
 """Cells of 0.5 nm from 300 to 1100 nm hold every band that a grid may have. Within a cell a spectrum counts as its mean, so
 that the power of a line of any width is kept."""
+
+PACKET = 4
+"""Rows that `SpectraTable.add_packets` keeps side by side and `SpectraOnDevice.packet` reads at once."""
 
 
 def cell_centres_nm() -> NDArray[np.float64]:
@@ -84,14 +97,45 @@ class SpectraTable:
         """Return all rows, (rows, CELL_COUNT)."""
         return np.stack(self._rows)
 
-    def finish(self, mi: Any) -> Any:
-        """Return the table as one flat device array: row r's cell c is at r * CELL_COUNT + c."""
-        return upload(mi.Float, self.values())
+    def add_packets(self, rows: list[NDArray[np.float32]]) -> int:
+        """Add rows of cell means side by side, filled up with black to whole packets, and return the number of the first packet."""
+        black = self._rows[self.BLACK]
+        while len(self._rows) % PACKET:
+            self._rows.append(black)
+        first = len(self._rows) // PACKET
+        self._rows += rows
+        return first
+
+    def finish(self, mi: Any) -> SpectraOnDevice:
+        """Return the table on the device."""
+        return SpectraOnDevice(mi, self.values())
 
 
-def look_up(mi: Any, table: Any, row: Any, cells: list[Any]) -> Any:
+class SpectraOnDevice:
+    """All rows of a table on the device, cell by cell: what a path looks up at one wavelength lies close together.
+
+    `values`, flat: row r's value in cell c is at c x `stride` + r.
+    """
+
+    def __init__(self, mi: Any, values: NDArray[np.float32]) -> None:
+        import drjit as dr  # noqa: PLC0415 - the renderer is loaded late
+
+        packets = -(-len(values) // PACKET)
+        by_cell = np.zeros((CELL_COUNT, packets * PACKET), dtype=np.float32)
+        by_cell[:, : len(values)] = values.T
+        self.values = upload(mi.Float, by_cell)
+        self.stride, self._packets = dr.opaque(mi.UInt32, packets * PACKET), dr.opaque(mi.UInt32, packets)
+
+    def packet(self, packet: Any, cell: Any, active: Any) -> Any:
+        """Return the values of a packet of rows in a cell, an Array4f."""
+        import drjit as dr  # noqa: PLC0415 - the renderer is loaded late
+
+        return dr.gather(dr.llvm.ad.Array4f, self.values, cell * self._packets + packet, active)
+
+
+def look_up(mi: Any, spectra: SpectraOnDevice, row: Any, cells: list[Any]) -> Any:
     """Return the values of `row` (UInt32) at a path's wavelength `cells`, as an array of len(cells) components."""
     import drjit as dr  # noqa: PLC0415 - the renderer is loaded late
 
-    base = row * CELL_COUNT
-    return dr.llvm.ad.ArrayXf([dr.gather(mi.Float, table, base + cell) for cell in cells])
+    places = [cell * spectra.stride + row for cell in cells]
+    return dr.llvm.ad.ArrayXf([dr.gather(mi.Float, spectra.values, place) for place in places])

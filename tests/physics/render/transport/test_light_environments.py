@@ -12,7 +12,7 @@ from fullwell.radiometry.sky import clear_sky
 from fullwell.radiometry.spectrum import Spectrum
 from fullwell.render import choose_variant
 from fullwell.render.transport.environment import DomeMap, cell_weights, image_map
-from fullwell.render.transport.wavelengths import FIRST_EDGE_NM, SpectraTable, cell_centres_nm
+from fullwell.render.transport.wavelengths import FIRST_EDGE_NM, PACKET, SpectraTable, cell_centres_nm
 from fullwell.render.variant import activate
 from fullwell.scene import ConstantEnvironment, ImageEnvironment, SunSky
 
@@ -50,8 +50,16 @@ def met(lit: Lit, directions: np.ndarray, cell: int = CELL, normal=NO_NORMAL) ->
     """(radiance, density, group) of each light that rays meet outside the scene."""
     lanes = len(directions)
     cells = [lit.mi.UInt32(np.full(lanes, cell, np.uint32))]
-    towards = lit.vector(directions, lanes)
-    parts = lit.lights.escaped(lit.spectra, lit.vector(normal, lanes), towards, cells, lit.all_lanes(lanes))
+    towards, everywhere = lit.vector(directions, lanes), lit.all_lanes(lanes)
+    parts = []
+    if "environment" in lit.lights.features:
+        radiance = lit.lights.environment_radiance(lit.spectra, towards, cells, everywhere)
+        there = lit.lights.environment_density(lit.vector(normal, lanes), towards, everywhere)
+        parts.append((radiance, there, lit.lights.environment_group))
+    if "sun" in lit.lights.features:
+        there = lit.lights.sun_density(towards)
+        inside = lit.mi.Float(there > 0)
+        parts.append((lit.lights.sun_radiance(lit.spectra, cells) * inside, there, lit.lights.sun_group))
     return [
         (np.asarray(radiance[0].numpy(), dtype=float), np.asarray(density.numpy(), dtype=float), int(group.numpy()[0]))
         for radiance, density, group in parts
@@ -89,14 +97,14 @@ def test_white_image_has_exactly_the_radiance_of_its_light(mi) -> None:
     light = illuminant("FL2")
     table = SpectraTable()
     dome = image_map(ImageEnvironment(np.ones((4, 8, 3), np.float32), light), table)
-    total = np.sum([table.row(int(row)).astype(float) for row in dome.spectra], axis=0)
+    total = np.sum([table.row(PACKET * dome.packet + k).astype(float) for k in range(3)], axis=0)
     assert total == pytest.approx(table.row(table.add(light)), rel=WHITE_ERROR, abs=1e-6)
 
 
 def test_colours_of_an_image_are_those_of_its_pixels_under_d65() -> None:
     table = SpectraTable()
     dome = image_map(ImageEnvironment(np.ones((1, 1, 3), np.float32), illuminant("D65")), table)
-    curves = [Spectrum(cell_centres_nm(), table.row(int(row)), outside="zero") for row in dome.spectra]
+    curves = [Spectrum(cell_centres_nm(), table.row(PACKET * dome.packet + k), outside="zero") for k in range(3)]
     for curve, xy in zip(curves, [(0.64, 0.33), (0.30, 0.60), (0.15, 0.06)], strict=True):
         assert chromaticity(curve) == pytest.approx(xy, abs=COLOUR_ERROR)
     mixed = sum(weight * tristimulus(curve) for weight, curve in zip((0.2, 0.5, 0.8), curves, strict=True))
@@ -208,16 +216,19 @@ def test_sun_and_sky_are_two_lights_each_with_its_density(mi, sun_group: str) ->
     lit = Lit.of(mi, lamps(rectangle(0.5, 2.0), groups=("default", "sun")), [light])
     assert lit.lights.features == {"tree", "environment", "sun"}
     sample = lit.sample((0, 0, 0), UP, 2**14)
-    far, of_dome = np.isinf(sample.distance.numpy()), sample._dome.numpy()
+    chosen = sample.dome.numpy()
+    assert np.array_equal(chosen, np.isinf(sample.distance.numpy()))
     directions = sample.direction.numpy().T.astype(float)
     sky, sun = met(lit, directions, normal=UP)
-    groups = sample.group.numpy()
-    for (radiance, part, group), chosen in ((sky, far & of_dome), (sun, far & ~of_dome)):
-        assert np.count_nonzero(chosen) > 500
-        assert part[chosen] == pytest.approx(sample.pdf.numpy()[chosen], rel=1e-3)
-        assert radiance[chosen] == pytest.approx(lit.radiance(sample)[chosen], rel=1e-4)
-        assert np.all(groups[chosen] == group)
+    assert np.count_nonzero(chosen) > 500
+    assert sky[1][chosen] == pytest.approx(sample.pdf.numpy()[chosen], rel=1e-3)
+    assert sky[0][chosen] == pytest.approx(lit.radiance(sample)[chosen], rel=1e-4)
+    assert np.all(sample.group.numpy()[chosen] == sky[2])
     assert (sky[2] != sun[2]) == bool(sun_group)
+    drawn, density_of_drawn = lit.lights.sample_sun(mi.Point2f(*np.random.default_rng(1).random((2, 4096), dtype=np.float32)))
+    _, sun = met(lit, drawn.numpy().T.astype(float), normal=UP)
+    assert np.mean(density_of_drawn.numpy() > 0) > 0.99
+    assert sun[1] == pytest.approx(density_of_drawn.numpy(), rel=1e-3)
     towards = np.array(SUN) / np.linalg.norm(SUN)
     beside = towards + 0.02 * np.cross(towards, [0.0, 0.0, 1.0])
     assert escaped(lit, towards[None])[0] > 1000 * escaped(lit, beside[None] / np.linalg.norm(beside))[0]
