@@ -98,7 +98,7 @@ class SpectraTable:
         return np.stack(self._rows)
 
     def add_packets(self, rows: list[NDArray[np.float32]]) -> int:
-        """Add rows of cell means side by side, filled up with black to whole packets, and return the number of the first packet."""
+        """Add rows of cell means side by side, filled up with black to whole packets, and return the first packet's number."""
         black = self._rows[self.BLACK]
         while len(self._rows) % PACKET:
             self._rows.append(black)
