@@ -10,7 +10,7 @@ prints for each scene the CPU-seconds that Cycles (RGB) needs over those of the 
 relative error of the luminance, twice: without bias (nothing clamped, no glossy filter, caustics), and with samples clamped by
 both, Cycles with its glossy filter too, as Blender sets it. Each renderer is judged by its own long run with the same settings;
 what a clamped run loses is the mean of that over the mean of the one without bias. Times are those beyond a run of the fewest
-samples: no start-up, no planning.
+samples (of Cycles the median of seven): no start-up, no planning. Below 256 samples Cycles' own start is most of its time.
 
 What is not the same: three colours instead of spectra, so colours of light after several bounces; the sun and sky are a sampled
 image and a disc; rough plastic and metals are Blender's Principled BSDF. Each renderer is compared with its own long run, so
