@@ -6,12 +6,36 @@ import dataclasses
 import hashlib
 import json
 import math
+import weakref
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-__all__ = ["canonical_json", "digest_of", "sha256_file", "sha256_hex"]
+__all__ = ["Unchanging", "canonical_json", "digest_of", "sha256_file", "sha256_hex"]
+
+
+class Unchanging:
+    """Base of frozen dataclasses, compared by identity, whose arrays nobody writes to: their digest is worked out once.
+
+    In canonical JSON they stand as their digest. Two with equal content have equal digests.
+    """
+
+    __slots__ = ("__weakref__",)
+
+
+_digests: weakref.WeakKeyDictionary[Unchanging, str] = weakref.WeakKeyDictionary()
+
+
+def _remembered(value: Unchanging) -> str:
+    digest = _digests.get(value)
+    if digest is None:
+        digest = _digests[value] = digest_of(_fields(value))
+    return digest
+
+
+def _fields(value: Any) -> dict[str, Any]:
+    return {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
 
 
 def _plain(value: Any) -> Any:
@@ -27,8 +51,9 @@ def _plain(value: Any) -> Any:
             return "inf" if value > 0 else "-inf"
         return 0.0 if value == 0 else value
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        fields = {f.name: _plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
-        return {"type": type(value).__name__, **fields}
+        if isinstance(value, Unchanging):
+            return {"type": type(value).__name__, "sha256": _remembered(value)}
+        return {"type": type(value).__name__, **_plain(_fields(value))}
     if isinstance(value, dict):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

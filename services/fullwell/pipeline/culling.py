@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import weakref
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,20 +16,15 @@ from fullwell.radiometry import SkyRadiance, Spectrum, WavelengthGrid, clear_sky
 from fullwell.scene import (
     Camera,
     ConstantEnvironment,
-    Cube,
-    Cylinder,
     DirectionalLight,
-    Disk,
-    Geometry,
     ImageEnvironment,
     Light,
     Mesh,
-    Rectangle,
     SceneDescription,
     SceneObject,
-    Sphere,
     SunSky,
 )
+from fullwell.scene.extents import box_of
 
 __all__ = ["Bounds", "leave_out", "object_bounds", "out_of_view", "relative_changes"]
 
@@ -146,9 +142,18 @@ class Bounds:
         return np.asarray(np.linalg.norm(self.high_m - self.low_m, axis=1) / 2)
 
 
+_bounds: weakref.WeakKeyDictionary[SceneDescription, Bounds] = weakref.WeakKeyDictionary()
+
+
 def object_bounds(scene: SceneDescription) -> Bounds:
-    """Return bounds in the world of all objects; each mesh is looked at once."""
-    boxes: dict[int, tuple[Array, Array]] = {}
+    """Return bounds in the world of all objects."""
+    found = _bounds.get(scene)
+    if found is None:
+        found = _bounds[scene] = _object_bounds(scene)
+    return found
+
+
+def _object_bounds(scene: SceneDescription) -> Bounds:
     middles: list[Array] = []
     halves: list[Array] = []
     placed: list[Array] = []
@@ -156,11 +161,9 @@ def object_bounds(scene: SceneDescription) -> Bounds:
     for item in scene.objects:
         starts.append(len(placed))
         for part in item.parts:
-            key = id(part.geometry)
-            if key not in boxes:
-                boxes[key] = _box(part.geometry)
-            middles.append(boxes[key][0])
-            halves.append(boxes[key][1])
+            middle, half = box_of(part.geometry)
+            middles.append(middle)
+            halves.append(half)
             placed.append(item.to_world @ part.to_object)
     if not starts:
         return Bounds(np.zeros((0, 3)), np.zeros((0, 3)))
@@ -169,27 +172,6 @@ def object_bounds(scene: SceneDescription) -> Bounds:
     points = np.einsum("nij,ncj->nci", matrices[:, :3, :3], corners) + matrices[:, None, :3, 3]
     low = np.minimum.reduceat(points.min(axis=1), starts, axis=0)
     return Bounds(low, np.maximum.reduceat(points.max(axis=1), starts, axis=0))
-
-
-def _box(geometry: Geometry) -> tuple[Array, Array]:
-    """Return the middle and the half edges of the box around a geometry, in its own coordinates [m]."""
-    match geometry:
-        case Mesh(vertices_m=vertices) if len(vertices):
-            low, high = vertices.min(axis=0), vertices.max(axis=0)
-            return (low + high) / 2, (high - low) / 2
-        case Rectangle(size_m=(width, height)):
-            half = [width / 2, height / 2, 0.0]
-        case Cube(size_m=(width, height, depth)):
-            half = [width / 2, height / 2, depth / 2]
-        case Sphere(radius_m=radius):
-            half = [radius, radius, radius]
-        case Disk(radius_m=radius):
-            half = [radius, radius, 0.0]
-        case Cylinder(radius_m=radius, height_m=height):
-            half = [radius, radius, height / 2]
-        case _:  # a mesh of nothing, which the renderer will refuse
-            half = [0.0, 0.0, 0.0]
-    return np.zeros(3), np.array(half)
 
 
 def out_of_view(bounds: Bounds, camera: Camera) -> NDArray[np.bool_]:

@@ -11,7 +11,7 @@ from fullwell.schema.frame import CameraRig, FrameDescription
 __all__ = ["KEY_SCHEMA", "frame_digest", "light_key"]
 
 KEY_SCHEMA = 1
-_RADIANCE_VERSION = 2
+_RADIANCE_VERSION = 3
 """Raise it when the same recipe gives other radiances."""
 
 

@@ -8,6 +8,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fullwell.core.hashing import Unchanging
 from fullwell.radiometry.spectrum import Spectrum
 
 __all__ = [
@@ -83,7 +84,7 @@ class Cylinder:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Mesh:
+class Mesh(Unchanging):
     """Triangles. `normals` and `uv` are per vertex, or None (then shading is flat / untextured)."""
 
     vertices_m: NDArray[np.float64]
@@ -99,7 +100,7 @@ Geometry: TypeAlias = Sphere | Rectangle | Disk | Cube | Cylinder | Mesh
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Texture:
+class Texture(Unchanging):
     """An sRGB colour image, (rows, cols, 3) uint8, row 0 at v = 1; upsampled to reflectance by the renderer."""
 
     pixels: NDArray[np.uint8]
@@ -251,7 +252,7 @@ class Part:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SceneObject:
+class SceneObject(Unchanging):
     """What a label counts as one thing.
 
     Attributes
@@ -405,7 +406,7 @@ Light: TypeAlias = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SceneDescription:
+class SceneDescription(Unchanging):
     """Everything the renderer needs but the camera."""
 
     objects: tuple[SceneObject, ...]

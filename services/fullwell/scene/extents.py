@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import weakref
+
 import numpy as np
 from numpy.typing import NDArray
 
 from fullwell.scene.camera import Camera
 from fullwell.scene.description import Cube, Cylinder, Disk, Geometry, Mesh, Rectangle, SceneDescription, Sphere
 
-__all__ = ["NEAR_M", "axis_cosines", "objects_in_view"]
+__all__ = ["NEAR_M", "axis_cosines", "box_of", "objects_in_view"]
 
 NEAR_M = 1e-4
 """Things are cut this far before the pupil, where the projection would go to infinity."""
@@ -33,17 +35,14 @@ def objects_in_view(scene: SceneDescription, camera: Camera) -> NDArray[np.bool_
     """
     if not scene.objects:
         return np.zeros(0, dtype=bool)
-    boxes: dict[int, NDArray[np.float64]] = {}
     corners: list[NDArray[np.float64]] = []
     matrices: list[NDArray[np.float64]] = []
     starts: list[int] = []
     for item in scene.objects:
         starts.append(len(corners))
         for part in item.parts:
-            box = boxes.get(id(part.geometry))
-            if box is None:
-                box = boxes[id(part.geometry)] = _box(part.geometry)
-            corners.append(box)
+            middle, half = box_of(part.geometry)
+            corners.append(middle + _CORNERS * half)
             matrices.append(item.to_world @ part.to_object)
     placed = np.einsum("ij,njk->nik", camera.world_to_camera, np.array(matrices))
     points = np.einsum("nij,ncj->nci", placed[:, :3, :3], np.array(corners)) + placed[:, None, :3, 3]
@@ -55,12 +54,19 @@ def objects_in_view(scene: SceneDescription, camera: Camera) -> NDArray[np.bool_
     return np.asarray(~outside.any(axis=0))
 
 
-def _box(geometry: Geometry) -> NDArray[np.float64]:
-    """Return the (8, 3) corners of the box around a geometry, in its own coordinates [m]."""
+_boxes: weakref.WeakKeyDictionary[Mesh, tuple[NDArray[np.float64], NDArray[np.float64]]] = weakref.WeakKeyDictionary()
+"""Each mesh is looked at once, however often it stands in scenes."""
+
+
+def box_of(geometry: Geometry) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the (3,) middle and the (3,) half edges of the box around a geometry, in its own coordinates [m]."""
     match geometry:
-        case Mesh(vertices_m=vertices):
-            low, high = vertices.min(axis=0), vertices.max(axis=0)
-            return np.asarray((low + high) / 2 + _CORNERS * (high - low) / 2)
+        case Mesh(vertices_m=vertices) if len(vertices):
+            found = _boxes.get(geometry)
+            if found is None:
+                low, high = vertices.min(axis=0).astype(np.float64), vertices.max(axis=0).astype(np.float64)
+                found = _boxes[geometry] = (low + high) / 2, (high - low) / 2
+            return found
         case Rectangle(size_m=(width, height)):
             half = [width / 2, height / 2, 0.0]
         case Cube(size_m=(width, height, depth)):
@@ -71,4 +77,6 @@ def _box(geometry: Geometry) -> NDArray[np.float64]:
             half = [radius, radius, 0.0]
         case Cylinder(radius_m=radius, height_m=height):
             half = [radius, radius, height / 2]
-    return np.asarray(_CORNERS * half)
+        case _:  # a mesh of nothing, which the renderer will refuse
+            half = [0.0, 0.0, 0.0]
+    return np.zeros(3), np.array(half)
