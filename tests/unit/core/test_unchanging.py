@@ -1,5 +1,14 @@
-@dataclasses.dataclass(frozen=True, slots=True, eq=False)
-class Kept(Unchanging):
+"""Digests of what never changes."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from fullwell.core.hashing import Unchanging, digest_of
+
+
     values: np.ndarray
 
 
