@@ -9,6 +9,8 @@ import numpy as np
 from fullwell.core.hashing import Unchanging, digest_of
 
 
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
+class Kept(Unchanging):
     values: np.ndarray
 
 
