@@ -9,7 +9,7 @@ import numpy as np
 
 from fullwell.pipeline.steps import PlanStep
 from fullwell.radiometry import Spectrum, WavelengthGrid, srgb_to_linear
-from fullwell.scene import Diffuse, Fog, Material, SceneDescription, Texture
+from fullwell.scene import Diffuse, Fog, Material, SceneDescription, Texture, Translucent
 
 __all__ = ["LargestReflectance", "choose_depth", "largest_reflectance", "tail_bound"]
 
@@ -56,6 +56,8 @@ def largest_reflectance(scene: SceneDescription, grid: WavelengthGrid) -> Larges
 
 def _reflectance(material: Material, grid: WavelengthGrid) -> float | None:
     """Return the largest reflectance of a matte material, or None."""
+    if isinstance(material, Translucent):
+        return min(1.0, _largest_value(material.reflectance, grid) + _largest_value(material.transmittance, grid))
     if not isinstance(material, Diffuse):
         return None
     if isinstance(material.reflectance, Texture):

@@ -15,7 +15,7 @@ from fullwell.core.rng import seed32
 from fullwell.radiometry import WavelengthGrid
 from fullwell.render.translate import check_sky_range, translate
 from fullwell.render.transport.progressive import REPLICAS, Work, check_samples
-from fullwell.scene import Camera, SceneDescription
+from fullwell.scene import Camera, SceneDescription, Translucent
 from fullwell.scene.groups import group_names, only_groups
 
 __all__ = ["ScalarImage"]
@@ -29,6 +29,8 @@ class ScalarImage:
     def __init__(self, mi: Any, work: Work) -> None:
         if work.scene.fog is not None:
             raise FieldError("fog needs the compiled renderer; leave it out or install libLLVM.", path="atmosphere")
+        if any(isinstance(part.material, Translucent) for thing in work.scene.objects for part in thing.parts):
+            raise RenderError("translucent materials need the compiled renderer; use diffuse ones or install libLLVM.")
         check_sky_range(work.scene, work.grid)
         self._mi, self._work = mi, work
         names = group_names(work.scene)

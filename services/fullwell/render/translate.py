@@ -45,6 +45,7 @@ from fullwell.scene import (
     SpotLight,
     SunSky,
     Texture,
+    Translucent,
 )
 from fullwell.scene.tessellate import is_similarity, mesh_of, transform_mesh
 from fullwell.scene.validate import check_scene, may_repeat_faces
@@ -216,7 +217,7 @@ def _two_sided(bsdf: dict[str, Any]) -> dict[str, Any]:
 
 def _bsdf(mi: Any, material: Material) -> dict[str, Any]:
     match material:
-        case Diffuse(reflectance=reflectance):
+        case Diffuse(reflectance=reflectance) | Translucent(reflectance=reflectance):  # see ScalarImage
             return _two_sided({"type": "diffuse", "reflectance": _colour(mi, reflectance)})
         case RoughPlastic():
             return _two_sided(

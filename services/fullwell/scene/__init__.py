@@ -31,6 +31,7 @@ from fullwell.scene.description import (
     SpotLight,
     SunSky,
     Texture,
+    Translucent,
 )
 from fullwell.scene.hits import SurfaceHits
 
@@ -68,5 +69,6 @@ __all__ = [
     "SunSky",
     "SurfaceHits",
     "Texture",
+    "Translucent",
     "look_at",
 ]

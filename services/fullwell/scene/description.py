@@ -41,6 +41,7 @@ __all__ = [
     "SpotLight",
     "SunSky",
     "Texture",
+    "Translucent",
 ]
 
 
@@ -114,6 +115,14 @@ class Diffuse:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Translucent:
+    """A thin sheet such as a leaf: Lambertian on both sides, for light from either; reflectance + transmittance in [0, 1]."""
+
+    reflectance: Spectrum
+    transmittance: Spectrum
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class RoughPlastic:
     """Diffuse base under a rough dielectric coat (GGX, `roughness` = alpha in (0, 1])."""
 
@@ -157,7 +166,7 @@ class Mirror:
     reflectance: Spectrum
 
 
-Material: TypeAlias = Diffuse | RoughPlastic | Principled | Conductor | Dielectric | Mirror
+Material: TypeAlias = Diffuse | RoughPlastic | Principled | Conductor | Dielectric | Mirror | Translucent
 
 
 # Objects -------------------------------------------------------------------------------------------------------------

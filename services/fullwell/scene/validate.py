@@ -43,6 +43,7 @@ from fullwell.scene.description import (
     SpotLight,
     SunSky,
     Texture,
+    Translucent,
 )
 
 __all__ = ["check_camera", "check_scene", "may_repeat_faces"]
@@ -318,6 +319,10 @@ def _material(material: Material, where: _Place) -> None:
     match material:
         case Diffuse() | Mirror():
             _reflectance(material.reflectance, where, "material.reflectance")
+        case Translucent():
+            _reflectance(material.reflectance, where, "material.reflectance")
+            _reflectance(material.transmittance, where, "material.transmittance")
+            _sheet(material, where)
         case RoughPlastic():
             _reflectance(material.reflectance, where, "material.reflectance")
             _between(material.roughness, 0, 1, where, "material.roughness")
@@ -348,6 +353,21 @@ def _reflectance(colour: Spectrum | Texture, where: _Place, field: str) -> None:
     if low < 0 or high > 1 + _ROUNDING:
         wrong = low if low < 0 else high
         where.fail(field, f"is {wrong:g} at some wavelength; must be in [0, 1]. Light would be made from nothing.", wrong)
+
+
+def _sheet(material: Translucent, where: _Place) -> None:
+    """Refuse a sheet that gives more light than it receives: the sum is greatest at a knot of either table."""
+    reflectance, transmittance = material.reflectance, material.transmittance
+    knots_nm = np.union1d(reflectance.wavelength_nm, transmittance.wavelength_nm)
+    total = reflectance.at(knots_nm) + transmittance.at(knots_nm)
+    highest = int(np.argmax(total))
+    if total[highest] > 1 + _ROUNDING:
+        where.fail(
+            "material.transmittance",
+            f"and material.reflectance sum to {total[highest]:g} at {knots_nm[highest]:g} nm; must be in [0, 1]. "
+            "Light would be made from nothing.",
+            float(total[highest]),
+        )
 
 
 def _power(spectrum: Spectrum, where: _Place, field: str) -> None:

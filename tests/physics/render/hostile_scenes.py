@@ -50,6 +50,7 @@ from fullwell.scene import (
     SpotLight,
     SunSky,
     Texture,
+    Translucent,
 )
 from fullwell.scene.tessellate import mesh_of
 
@@ -399,6 +400,14 @@ _SHAPES = [
 _MATERIALS = [
     Hostile("reflectance 1.5", lambda: of(Diffuse(constant(1.5))), (THING, "reflectance is 1.5", "[0, 1]")),
     Hostile("negative reflectance", lambda: of(Diffuse(constant(-0.5))), (THING, "reflectance is -0.5", "[0, 1]")),
+    Hostile(
+        "transmittance -0.1", lambda: of(Translucent(constant(0.5), constant(-0.1))), (THING, "transmittance is -0.1", "[0, 1]")
+    ),
+    Hostile(
+        "sheet that makes light",
+        lambda: of(Translucent(constant(0.6), constant(0.5))),
+        (THING, "material.transmittance and material.reflectance sum to 1.1", "[0, 1]"),
+    ),
     Hostile("mirror of reflectance 2", lambda: of(Mirror(constant(2.0))), (THING, "reflectance is 2")),
     Hostile("base colour 1.01", lambda: of(Principled(constant(1.01))), (THING, "base_color is 1.01")),
     Hostile("roughness 2", lambda: of(RoughPlastic(constant(0.5), 2.0)), (THING, "roughness is 2.0", "[0, 1]")),

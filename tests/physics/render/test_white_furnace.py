@@ -25,6 +25,7 @@ from fullwell.scene import (
     SceneDescription,
     SceneObject,
     Sphere,
+    Translucent,
 )
 from fullwell.scene.tessellate import mesh_of
 
@@ -39,6 +40,7 @@ FLINT = glass("N-SF11")
 
 MATERIALS: list[tuple[str, Material, int]] = [
     ("diffuse", Diffuse(UNIT), 64),
+    ("sheet", Translucent(Spectrum.constant(0.55), Spectrum.constant(0.45)), 12288),
     *((f"plastic of roughness {a}", RoughPlastic(UNIT, a), 1024) for a in (0.02, 0.3, 1.0)),
     *(
         (f"principled of roughness {r}, metallic {m}", Principled(UNIT, r, m), 8192)

@@ -309,7 +309,7 @@ def _loop_body(self: Any, given: Any, lanes: int) -> Any:  # noqa: PLR0912, PLR0
                 given.tables["spectra"], hit.material, hit.uv, cell_list, wavelengths_nm, texture_pair.y, alive, single
             )
             facing = dr.select(wi.z < 0, -hit.shading_normal, hit.shading_normal)
-            bound = dr.select(surface.is_glass | in_fog, mi.Vector3f(0), facing)
+            bound = dr.select(surface.lit_behind | in_fog, mi.Vector3f(0), facing)
             lit = alive & (surface.has_smooth | in_fog)
             if self._lights.count > 0:  # noqa: SIM102 - decided while compiling; the next one on the lanes
                 if lit:

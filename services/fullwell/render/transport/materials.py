@@ -26,8 +26,8 @@ class MaterialTable:
     Attributes
     ----------
     features
-        Which code the materials need, of "texture", "plastic", "metal", "glass", "rough_glass" and "dispersion". Kernels of
-        equal features are the same, whatever the materials.
+        Which code the materials need, of "texture", "translucent", "plastic", "metal", "glass", "rough_glass" and "dispersion".
+        Kernels of equal features are the same, whatever the materials.
     """
 
     features: frozenset[str]
@@ -75,6 +75,8 @@ class MaterialTable:
         surface.colour = look_up(self._mi, spectra_device, hit.row("colour"), cells)
         if "texture" in self.features:
             surface.colour = self._textured(hit, surface.colour, uv, wavelengths_nm, u_texture)
+        if "translucent" in self.features:
+            surface.transmit(look_up(self._mi, spectra_device, hit.row("transmitted"), cells))
         if "metal" in self.features:
             surface.eta = look_up(self._mi, spectra_device, hit.row("eta"), cells)
             surface.k = look_up(self._mi, spectra_device, hit.row("k"), cells)

@@ -24,7 +24,7 @@ from fullwell.render.transport.fresnel import conductor_mean
 from fullwell.render.transport.microfacet import POLISHED_BELOW
 from fullwell.render.transport.textures import TextureAtlas
 from fullwell.render.transport.wavelengths import SpectraTable, cell_means
-from fullwell.scene import Conductor, Dielectric, Diffuse, Material, Mirror, Principled, RoughPlastic, Texture
+from fullwell.scene import Conductor, Dielectric, Diffuse, Material, Mirror, Principled, RoughPlastic, Texture, Translucent
 
 __all__ = ["DISPERSIVE", "GLASS", "NUMBERS", "ROWS", "TEXTURED", "TINTED", "MaterialRecords"]
 
@@ -61,6 +61,7 @@ class _Record:
     eta: int = SpectraTable.BLACK
     k: int = SpectraTable.BLACK
     index: int = SpectraTable.BLACK
+    transmitted: int = SpectraTable.BLACK
     coat_row: int = 0
     metal_row: int = 0
     glass_row: int = 0
@@ -91,6 +92,7 @@ ROWS = (
     "eta",
     "k",
     "index",
+    "transmitted",
     "coat_row",
     "metal_row",
     "glass_row",
@@ -159,6 +161,10 @@ class MaterialRecords:
         match material:
             case Diffuse(reflectance=reflectance):
                 self._colour(record, reflectance)
+            case Translucent():
+                self._colour(record, material.reflectance)
+                record.transmitted = self._spectra.add(material.transmittance)
+                self._found.add("translucent")
             case RoughPlastic():
                 self._colour(record, material.reflectance)
                 self._coat(record, material.roughness, material.interior_index)

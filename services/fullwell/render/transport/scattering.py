@@ -90,6 +90,7 @@ class Surface:
         self._albedo, self._count = albedo, count
         self._plastic, self._metal, self._glass = (name in features for name in ("plastic", "metal", "glass"))
         self._rough_glass = "rough_glass" in features
+        self._transmitted: Any = None
         self._lobes = self._plastic or self._metal
         alpha = hit.number("alpha") if self._lobes or self._glass else mi.Float(1.0)
         self.polished = alpha < POLISHED_BELOW
@@ -123,6 +124,18 @@ class Surface:
         alone = mi.Float(self._count) if single is None else dr.select(single, 1.0, float(self._count))
         self._first_only = dr.llvm.ad.ArrayXf([alone] + [mi.Float(0.0)] * (self._count - 1))
 
+    def transmit(self, transmitted: Any) -> None:
+        """Let a sheet scatter the share `transmitted` of the light, per wavelength, on its other side."""
+        dr = self._dr
+        self._transmitted = transmitted
+        through = self._mean(transmitted)
+        self._through_share = through / dr.maximum(through + self._mean(self.colour), 1e-20)
+
+    @property
+    def lit_behind(self) -> Any:
+        """Whether light from behind the surface can leave it in front."""
+        return self.is_glass if self._transmitted is None else self.is_glass | (self._through_share > 0)
+
     @property
     def has_smooth(self) -> Any:
         """Whether `evaluate` can be other than zero: there is more than delta distributions."""
@@ -137,6 +150,8 @@ class Surface:
         """Return the scattering function x |cosine|, per wavelength, and the density [sr^-1]: of all but delta lobes."""
         wi_up, wo_up = self._upright(wi, wi), self._upright(wo, wi)
         value, pdf, _ = self._opaque(wi_up, wo_up)
+        if self._transmitted is not None:
+            value, pdf = self._with_sheet(value, pdf, wo_up)
         if self._glass:
             value, pdf = self._dr.select(self.is_glass, 0.0, value), self._dr.select(self.is_glass, 0.0, pdf)
         if self._rough_glass:
@@ -161,13 +176,16 @@ class Surface:
             facet = dr.select(self.polished, mi.Vector3f(0, 0, 1), normal)
             wo = dr.select(at_facet, 2.0 * dr.dot(up, facet) * facet - up, wo)
         weight, pdf, reflectance = self._opaque(up, wo)
+        through = mi.Bool(False)
+        if self._transmitted is not None:
+            through = u_lobe < self._through_share
+            wo = mi.Vector3f(wo.x, wo.y, dr.select(through, -wo.z, wo.z))
+            weight, pdf = self._with_sheet(weight, pdf, wo)
         weight = dr.select(pdf > 0, weight / dr.maximum(pdf, 1e-30), 0.0)
         if self._lobes:
             weight = dr.select(delta, reflectance / dr.maximum(share, 1e-30), weight)
             pdf = dr.select(delta, 0.0, pdf)
-        drawn = BsdfSample(
-            wo, weight, pdf, mi.Bool(False) if delta is None else delta, mi.Bool(False), mi.Bool(False), mi.Float(1.0)
-        )
+        drawn = BsdfSample(wo, weight, pdf, mi.Bool(False) if delta is None else delta, through, mi.Bool(False), mi.Float(1.0))
         if self._glass:
             drawn = self._with_glass(drawn, up, wi.z > 0, u_lobe=u_lobe, normal=normal)
         drawn.wo = self._upright(drawn.wo, wi)
@@ -195,6 +213,14 @@ class Surface:
             value = value + reflectance * (facets * masking(dr, wo, self._alpha))
             pdf = dr.lerp(pdf, facets, share)
         return dr.select(above, value, 0.0), dr.select(above, pdf, 0.0), reflectance
+
+    def _with_sheet(self, value: Any, pdf: Any, wo: Any) -> tuple[Any, Any]:
+        """Return value and density of an opaque surface with what a sheet sends below; equal where nothing is transmitted."""
+        dr = self._dr
+        below = wo.z < 0
+        cosine = dr.maximum(-wo.z, 0.0) / np.pi
+        value = dr.select(below, self._transmitted * cosine, value)
+        return value, dr.select(below, self._through_share * cosine, (1.0 - self._through_share) * pdf)
 
     def _base(self, mu_i: Any, mu_o: Any) -> Any:
         """Return pi times the scattering function of all that scatters widely."""
@@ -314,7 +340,7 @@ class Surface:
             weight=dr.select(glass, weight, opaque.weight),
             pdf=dr.select(glass, pdf, opaque.pdf),
             delta=dr.select(glass, self.polished, opaque.delta),
-            transmitted=through,
+            transmitted=dr.select(glass, through, opaque.transmitted),
             single_wavelength=mi.Bool(False) if self._dispersive is None else through & self._dispersive,
             eta=dr.select(through, index, 1.0),
         )

@@ -18,6 +18,7 @@ from fullwell.scene import (
     Principled,
     RoughPlastic,
     Texture,
+    Translucent,
 )
 from fullwell.schema.conversion.assets import catalogue_material, is_catalogue_name
 from fullwell.schema.conversion.context import Context, fail, located
@@ -56,6 +57,11 @@ def _converted(document: Any, path: str, context: Context) -> tuple[Material, Em
     match document:
         case documents.DiffuseMaterial():
             return Diffuse(reflectance_of(document.reflectance, f"{path}.reflectance", context)), None
+        case documents.TranslucentMaterial():
+            reflectance, transmittance = (
+                reflectance_of(getattr(document, key), f"{path}.{key}", context) for key in ("reflectance", "transmittance")
+            )
+            return Translucent(reflectance, transmittance), None
         case documents.RoughPlasticMaterial():
             spectrum = reflectance_of(document.reflectance, f"{path}.reflectance", context)
             return RoughPlastic(spectrum, document.roughness, document.interior_index), None

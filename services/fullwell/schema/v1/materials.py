@@ -22,6 +22,14 @@ class DiffuseMaterial(Document):
     reflectance: Reflectance
 
 
+class TranslucentMaterial(Document):
+    """A thin sheet such as a leaf, Lambertian on both sides; reflectance + transmittance <= 1 at every wavelength."""
+
+    kind: Literal["translucent"]
+    reflectance: Reflectance
+    transmittance: Reflectance
+
+
 class RoughPlasticMaterial(Document):
     """Diffuse base under a rough clear coat; `roughness` is the GGX alpha."""
 
@@ -129,6 +137,7 @@ def check_spd(document: Any, quantity: str) -> None:
 
 MaterialDocument = Annotated[
     DiffuseMaterial
+    | TranslucentMaterial
     | RoughPlasticMaterial
     | PrincipledMaterial
     | ConductorMaterial

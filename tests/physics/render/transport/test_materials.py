@@ -13,7 +13,7 @@ from scipy.stats import qmc
 from fullwell.radiometry import Spectrum, metal
 from fullwell.radiometry.glasses import glass
 from fullwell.render.variant import VECTORISED, activate
-from fullwell.scene import Conductor, Dielectric, Diffuse, Material, Mirror, Principled, RoughPlastic
+from fullwell.scene import Conductor, Dielectric, Diffuse, Material, Mirror, Principled, RoughPlastic, Translucent
 
 ENERGY_TOLERANCE = 1e-3
 """What the product promises."""
@@ -31,6 +31,7 @@ COSINES = (1.0, 0.85, 0.5, 0.2, 0.05, 0.01)
 WAVELENGTHS = 4
 ONE, ZERO = Spectrum.constant(1.0), Spectrum.constant(0.0)
 RAMP = Spectrum(np.array([400.0, 800.0]), np.array([0.1, 0.9]))
+FALL = Spectrum(np.array([400.0, 800.0]), np.array([0.6, 0.1]))
 
 
 class Bench:
@@ -108,6 +109,7 @@ def mean_weights(
 
 WHITE: list[tuple[str, Material]] = [
     ("diffuse", Diffuse(ONE)),
+    *((f"sheet {t}", Translucent(Spectrum.constant(1.0 - t), Spectrum.constant(t))) for t in (0.0, 0.3, 1.0)),
     ("mirror", Mirror(ONE)),
     *((f"metal {a}", Conductor(ZERO, ONE, a)) for a in (0.0, 0.003, 0.05, 0.2, 0.6, 1.0)),
     *((f"plastic {a} {n}", RoughPlastic(ONE, a, n)) for a in (5e-4, 0.005, 0.1, 0.5, 1.0) for n in (1.0, 1.2, 1.5, 3.0)),
@@ -171,6 +173,7 @@ def _fresnel(cosine: float, index: float) -> float:
 EYES: list[tuple[str, Material]] = [
     ("diffuse", Diffuse(RAMP)),
     ("metal", Conductor(*metal("gold"), 0.3)),
+    ("sheet", Translucent(RAMP, FALL)),
     ("plastic", RoughPlastic(RAMP, 0.15, 1.5)),
     ("polished plastic", RoughPlastic(RAMP, 5e-4, 1.5)),
     ("principled", Principled(RAMP, 0.6, 0.5)),
