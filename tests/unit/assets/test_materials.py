@@ -90,7 +90,8 @@ def test_an_unknown_name_is_answered_with_the_nearest() -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_what_a_kind_needs_is_there_and_names_its_source(name: str) -> None:
     material = asset_material(name)
-    has_reflectance = material.kind in ("diffuse", "coated", "mirror")
+    has_reflectance = material.kind in ("diffuse", "translucent", "coated", "mirror")
+    assert (material.transmittance is not None) == (material.kind == "translucent")
     assert (material.reflectance is not None) == has_reflectance
     assert (material.eta is not None and material.k is not None) == (material.kind == "metal")
     assert 0.0 <= material.roughness <= 1.0
@@ -294,3 +295,19 @@ def test_sodium_lamps_shine_at_819_nm_and_phosphor_lamps_do_not_shine_beyond_850
     assert white is not None
     assert sodium.spd.at(819) > 3 * sodium.spd.at(790)
     assert white.spd.integral([850.0, 1000.0])[0] < 0.002 * white.spd.integral([380.0, 780.0])[0]
+
+
+def test_green_leaves_pass_green_and_infrared_and_make_no_light() -> None:
+    """Broad leaves: LOPEX93 (Hosgood et al. 1995) has transmittances near 0.1 in the green and 0.4 to 0.5 beyond 750 nm."""
+    leaf = asset_material("foliage/broadleaf")
+    assert leaf.reflectance is not None
+    assert leaf.transmittance is not None
+    green, red, infrared = leaf.transmittance.at([550.0, 680.0, 850.0])
+    assert 0.05 < green < 0.15
+    assert red < 0.02
+    assert 0.38 < infrared < 0.52
+    for name in ("broadleaf", "birch", "conifer", "hedge", "autumn"):
+        material = asset_material(f"foliage/{name}")
+        assert material.reflectance is not None
+        assert material.transmittance is not None
+        assert np.all(material.reflectance.values + material.transmittance.values < 1.0)

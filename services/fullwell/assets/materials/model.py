@@ -9,8 +9,9 @@ from fullwell.radiometry.spectrum import Spectrum
 
 __all__ = ["Lamp", "MaterialKind", "SpectralMaterial"]
 
-MaterialKind = Literal["diffuse", "coated", "metal", "glass", "mirror"]
-"""Lambertian; diffuse base under a clear GGX coat; conductor with complex index; clear dielectric body; ideal mirror."""
+MaterialKind = Literal["diffuse", "translucent", "coated", "metal", "glass", "mirror"]
+"""Lambertian; thin sheet that is so on both sides; diffuse base under a clear GGX coat; conductor with complex index;
+clear dielectric body; ideal mirror."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,7 +35,9 @@ class SpectralMaterial:
     kind
         Surface model; decides which of the following are used.
     reflectance
-        Of the base (diffuse, coated) or the mirror; valid 380 to 1000 nm, in [0, 1].
+        Of the base (diffuse, translucent, coated) or the mirror; valid 380 to 1000 nm, in [0, 1].
+    transmittance
+        Of a translucent sheet; with the reflectance at most 1.
     roughness
         GGX alpha of coat, metal or glass; 0 is polished.
     interior_index
@@ -67,3 +70,4 @@ class SpectralMaterial:
     lamp: Lamp | None = None
     tags: tuple[str, ...] = ()
     retroreflective: bool = False
+    transmittance: Spectrum | None = None

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Final, Literal
 
 from fullwell.assets.materials.curves import Array, reflectance_spectrum
-from fullwell.assets.materials.leaves import LEAF_SOURCE, Leaf, leaf_reflectance
+from fullwell.assets.materials.leaves import LEAF_SOURCE, Leaf, leaf_reflectance, leaf_transmittance
 from fullwell.assets.materials.model import SpectralMaterial
 from fullwell.assets.materials.pigments import PIGMENT_SOURCE, mixture_reflectance
 from fullwell.assets.materials.skin import SKIN_INDEX, SKIN_SOURCE, skin_body_reflectance
@@ -98,7 +99,12 @@ def _typical() -> Iterator[SpectralMaterial]:
 
 def _modelled() -> Iterator[SpectralMaterial]:
     for name, leaf in _LEAVES.items():
-        yield _material(name, leaf_reflectance(leaf), "model", LEAF_SOURCE)
+        opaque = _material(name, leaf_reflectance(leaf), "model", LEAF_SOURCE)
+        if not name.startswith("foliage/"):  # grass is laid on the ground as a whole: nothing shines through
+            yield opaque
+            continue
+        through = reflectance_spectrum(leaf_transmittance(leaf), LEAF_SOURCE)
+        yield replace(opaque, kind="translucent", transmittance=through)
     for name, (melanin, blood) in _SKIN.items():
         values = skin_body_reflectance(melanin_share=melanin, blood_share=blood)
         yield _material(f"skin/{name}", values, "model", SKIN_SOURCE)

@@ -12,7 +12,18 @@ import numpy as np
 from fullwell.core.errors import unknown_name_message
 from fullwell.core.rng import stream
 from fullwell.radiometry import Spectrum, scale_to_luminance
-from fullwell.scene import Conductor, Dielectric, Diffuse, Emission, Material, Mirror, Principled, RoughPlastic, Texture
+from fullwell.scene import (
+    Conductor,
+    Dielectric,
+    Diffuse,
+    Emission,
+    Material,
+    Mirror,
+    Principled,
+    RoughPlastic,
+    Texture,
+    Translucent,
+)
 from fullwell.schema.assets import candidates_of, no_candidate, query_of, split_pin
 from fullwell.schema.conversion.context import Context, fail, located
 from fullwell.schema.conversion.spectra import colour_of
@@ -180,6 +191,8 @@ def _surface(entry: SpectralMaterial) -> Material:
     match entry.kind:
         case "diffuse":
             return Diffuse(_given(entry.reflectance, entry.name))
+        case "translucent":
+            return Translucent(_given(entry.reflectance, entry.name), _given(entry.transmittance, entry.name))
         case "coated":
             roughness = max(entry.roughness, _SMALLEST_ROUGHNESS)
             return RoughPlastic(_given(entry.reflectance, entry.name), roughness, entry.interior_index)
