@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fullwell.core.errors import FieldError
 from fullwell.radiometry.spectrum import Spectrum
 from fullwell.scene import Cube, Cylinder, Disk, Mesh, Part, Rectangle, SceneDescription, Sphere
+from fullwell.scene.extents import box_of
 
 __all__ = [
     "RAY_START",
@@ -75,9 +76,9 @@ def check_reach(scene: SceneDescription, centre_m: NDArray[np.float64], *, small
 def _corners(part: Part) -> NDArray[np.float64]:
     """Return (2, 3) lowest and highest coordinates of the part in its own axes [m]."""
     match part.geometry:
-        case Mesh(vertices_m=vertices):
-            # Column by column: along the first axis of an (n, 3) array NumPy is an order of magnitude slower.
-            return np.array([[column.min(), column.max()] for column in vertices.T]).T
+        case Mesh():
+            middle, half = box_of(part.geometry)
+            return np.array([middle - half, middle + half])
         case Sphere(radius_m=radius) | Disk(radius_m=radius):
             return np.array([[-radius] * 3, [radius] * 3])
         case Cylinder(radius_m=radius, height_m=height):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -269,6 +270,9 @@ class _Exposure:
 _METERING_SAMPLES = 4
 """Of each replica, in the picture of the scene standing still that an automatic exposure is found from."""
 
+_METERED_PIXELS, _LARGEST_BLOCK = 16384, 8
+"""Film samples that are enough for its percentiles, and how many along each side of a block one of them stands for at most."""
+
 
 def _stage(mi: Any, work: Work, request: MotionRequest) -> Stage:
     """Load what stands still."""
@@ -287,14 +291,25 @@ def _exposed(mi: Any, work: Work, stage: Stage, request: MotionRequest, report: 
     if callable(time_s):
         report(0.0)
         still = ProgressiveImage(mi, replace(work, keep_bands=False, seed=seed32(work.seed, "metering")), stage)
-        still.add(np.arange(still.pixels), np.full(still.pixels, _METERING_SAMPLES), lambda _: report(0.0))
-        mean = still.replicas().mean(axis=0, dtype=np.float64)
+        mean = _metered(still, report)
         time_s = time_s(np.tensordot(_weights(still.groups, request.group_weights), mean, axes=(0, 0)))
     moments = cut_exposure(work.scene, work.camera, request, time_s)
     if moments is None:
         return _Exposure(time_s=time_s)
     step_px = request.shift_px(time_s + request.readout_s) / moments.count
     return _Exposure(moments, step_px if np.isfinite(step_px) else -1.0, time_s)
+
+
+def _metered(image: ProgressiveImage, report: Reporter) -> NDArray[np.float64]:
+    """Return (groups, channels, rows, cols) of few samples; of a large picture one film sample stands for a block."""
+    block = max(1, min(_LARGEST_BLOCK, math.isqrt(image.pixels // _METERED_PIXELS)))
+    chosen = np.arange(image.pixels).reshape(image.rows, image.cols)[block // 2 :: block, block // 2 :: block]
+    image.add(chosen.ravel(), np.full(chosen.size, _METERING_SAMPLES), lambda _: report(0.0))
+    means = image.replicas().mean(axis=0, dtype=np.float64)
+    row, col = (
+        np.minimum(np.arange(size) // block, count - 1) for size, count in zip(means.shape[2:], chosen.shape, strict=True)
+    )
+    return np.asarray(means.reshape(*means.shape[:2], -1)[..., chosen[np.ix_(row, col)]])
 
 
 def _weights(groups: tuple[str, ...], by_name: Mapping[str, float]) -> NDArray[np.float64]:

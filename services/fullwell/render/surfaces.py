@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fullwell.core.errors import CancelledError, FullwellError, RenderError
+from fullwell.core.errors import CancelledError, FieldError, FullwellError, RenderError
 from fullwell.render.casting import Caster, CompiledCaster, ScalarCaster, Seen
 from fullwell.render.subpixel import edge_pixels, film_positions, following_pixels, sample_offsets
 from fullwell.render.translate import translate
 from fullwell.render.transport.loading import load_geometry
 from fullwell.render.variant import activate
-from fullwell.scene import Camera, SceneDescription, SurfaceHits
-from fullwell.scene.extents import axis_cosines
-from fullwell.scene.validate import check_camera
+from fullwell.scene import Camera, Geometry, Mesh, SceneDescription, SurfaceHits
+from fullwell.scene.extents import axis_cosines, objects_in_view
+from fullwell.scene.validate import check_camera, check_scene
 
 __all__ = ["query_depth", "query_surfaces"]
 
@@ -24,6 +25,11 @@ _STEPS = 4
 """Pixels that a thin thing is followed at once, from the second round on."""
 
 _RAYS_AT_ONCE = 1 << 20
+
+_MANY_TRIANGLES = 1 << 18
+_SMALL_SHARE = 0.6
+"""Of a scene of many triangles only what may be in view is loaded, where that is at most this share of them. Decided by the
+scene and the camera alone: where two surfaces coincide, which of them is met depends on what else is there."""
 
 
 def query_surfaces(
@@ -81,8 +87,18 @@ class _Query:
         check_camera(camera)
         self._camera, self._should_cancel = camera, should_cancel
         self.shape = camera.film.rows, camera.film.cols
-        self._objects = len(scene.objects)
-        self._caster = _caster(activate(), scene, camera)
+        self._all_objects = len(scene.objects)
+        self._numbers = _needed(scene, camera)
+        """Of the objects that are loaded, in the scene; None: all are."""
+        needed = scene
+        if self._numbers is not None:
+            needed = replace(scene, objects=tuple(scene.objects[number] for number in self._numbers))
+        self._objects = len(needed.objects)
+        try:
+            self._caster = _caster(activate(), needed, camera)
+        except FieldError:
+            check_scene(scene)  # an error names the place in the scene that was given
+            raise
 
     def centres(self) -> Seen:
         """Return what the rays through all pixel centres meet first."""
@@ -117,14 +133,22 @@ class _Query:
         hidden_px = amodal_px - visible_px
         area_px = seen.area_px + hidden_px if extents.area_px is None else np.maximum(extents.area_px, seen.area_px)
         return SurfaceHits(
-            object_index=ids,
+            object_index=ids if self._numbers is None else np.append(self._numbers, -1).astype(ids.dtype)[ids],
             range_m=centre.range_m.reshape(self.shape),
             normal_camera=(centre.normal @ self._camera.camera_to_world[:3, :3].astype(np.float32)).reshape(*self.shape, 3),
             coverage=seen.coverage.reshape(self.shape),
-            amodal_px=amodal_px,
-            visible_area_px=seen.area_px,
-            amodal_area_px=area_px,
+            amodal_px=self._of_all(amodal_px),
+            visible_area_px=self._of_all(seen.area_px),
+            amodal_area_px=self._of_all(area_px),
         )
+
+    def _of_all(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return a value for each object of the scene: 0 for those that are not loaded."""
+        if self._numbers is None:
+            return values
+        spread = np.zeros(self._all_objects, dtype=values.dtype)
+        spread[self._numbers] = values
+        return spread
 
     def _places(
         self, pixels: NDArray[np.int64], offsets: NDArray[np.float64]
@@ -135,6 +159,22 @@ class _Query:
             if self._should_cancel is not None and self._should_cancel():
                 raise CancelledError("the label pass was cancelled; nothing was written")
             yield film_positions(pixels[start : start + at_once], offsets, self.shape[1])
+
+
+def _needed(scene: SceneDescription, camera: Camera) -> NDArray[np.int64] | None:
+    """Return the numbers of the objects that may be in view, where loading only those is worth it; else None."""
+    triangles = np.array([sum(_triangles(part.geometry) for part in item.parts) for item in scene.objects], dtype=np.int64)
+    if triangles.sum() < _MANY_TRIANGLES:
+        return None
+    try:
+        seen = objects_in_view(scene, camera)
+    except ValueError:  # arrays that are no meshes: the check of the whole scene names them
+        return None
+    return np.flatnonzero(seen) if 0 < triangles[seen].sum() <= _SMALL_SHARE * triangles.sum() else None
+
+
+def _triangles(geometry: Geometry) -> int:
+    return len(geometry.faces) if isinstance(geometry, Mesh) else 1
 
 
 def _caster(mi: Any, scene: SceneDescription, camera: Camera) -> Caster:

@@ -7,6 +7,7 @@ lamp) or die of it (an environment image without pixels). The checks here hold f
 from __future__ import annotations
 
 import math
+import weakref
 from typing import Any, NoReturn
 
 import numpy as np
@@ -45,6 +46,7 @@ from fullwell.scene.description import (
     Texture,
     Translucent,
 )
+from fullwell.scene.extents import box_of
 
 __all__ = ["check_camera", "check_scene", "may_repeat_faces"]
 
@@ -219,8 +221,13 @@ def _half_extent(geometry: Geometry) -> NDArray[np.float64]:
             return np.asarray(size, dtype=np.float64) / 2
         case Cylinder(radius_m=radius, height_m=height):
             return np.array([radius, radius, height / 2])
-        case Mesh(vertices_m=vertices):
-            return np.asarray(np.maximum(np.abs(vertices.min(axis=0)), np.abs(vertices.max(axis=0))))
+        case Mesh():
+            middle, half = box_of(geometry)
+            return np.asarray(np.abs(middle) + half)
+
+
+_sound: weakref.WeakSet[Mesh] = weakref.WeakSet()
+"""Meshes that were looked at: those that move are in a scene for each moment of the exposure."""
 
 
 def _geometry(geometry: Geometry, where: _Place) -> None:
@@ -233,8 +240,9 @@ def _geometry(geometry: Geometry, where: _Place) -> None:
         case Cylinder(radius_m=radius, height_m=height):
             _positive(radius, where, "geometry.radius_m")
             _positive(height, where, "geometry.height_m")
-        case Mesh():
+        case Mesh() if geometry not in _sound:
             _mesh(geometry, where)
+            _sound.add(geometry)
 
 
 def _mesh(mesh: Mesh, where: _Place) -> None:

@@ -239,3 +239,36 @@ def test_samples_of_a_pixel_stand_apart_and_evenly(count: int) -> None:
 def test_odd_numbers_of_further_rays_are_refused(count: int) -> None:
     with pytest.raises(FieldError, match="subsamples"):
         query_surfaces(SceneDescription(()), camera(), subsamples=count)
+
+
+def many_triangles(rows: int, x: float, y: float, name: str) -> SceneObject:
+    """Return a sheet of 2 (rows - 1)^2 triangles."""
+    side = np.linspace(-1.0, 1.0, rows)
+    vertices = np.stack([*np.meshgrid(side, side), np.zeros((rows, rows))], axis=-1).reshape(-1, 3)
+    corner = np.arange(rows * rows).reshape(rows, rows)[:-1, :-1].ravel()
+    faces = np.concatenate(
+        [np.stack([corner, corner + 1, corner + rows], 1), np.stack([corner + 1, corner + rows + 1, corner + rows], 1)]
+    )
+    return facing(name, Mesh(vertices, faces), x=x, y=y)
+
+
+def test_what_is_out_of_view_of_a_large_scene_changes_nothing() -> None:
+    near, half_hidden = facing("near", Disk(0.5), x=0.3), facing("far", Rectangle((2.0, 1.0)), y=3.0)
+    behind = many_triangles(400, 0.0, -60.0, "behind")
+    assert 2 * 399**2 > 1 << 18
+    small = query_surfaces(SceneDescription((near, half_hidden, WALL)), camera())
+    large = query_surfaces(SceneDescription((behind, near, behind, half_hidden, WALL)), camera())
+    assert np.array_equal(large.object_index, np.array([1, 3, 4, -1])[small.object_index])
+    for name in ("range_m", "normal_camera", "coverage"):
+        assert np.array_equal(getattr(large, name), getattr(small, name))
+    for name in ("amodal_px", "visible_area_px", "amodal_area_px"):
+        assert np.array_equal(getattr(large, name)[[1, 3, 4]], getattr(small, name))
+        assert np.all(getattr(large, name)[[0, 2]] == 0)
+
+
+def test_error_in_a_large_scene_names_the_object_where_it_stands() -> None:
+    broken = facing("broken", Mesh(np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]), np.array([[0, 1, 2]])))
+    scene = SceneDescription((many_triangles(400, 0.0, -60.0, "behind"), broken))
+    with pytest.raises(FieldError, match="broken") as refused:
+        query_surfaces(scene, camera())
+    assert refused.value.path.startswith("scene.objects[1]")

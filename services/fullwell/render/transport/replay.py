@@ -58,7 +58,10 @@ def replayed(kind: Hashable, function: Callable[..., Any], scene: Any, arrays: l
 
 
 def device_arrays(*objects: Any) -> list[Any]:
-    """Return the Dr.Jit arrays that the package's own objects hold, each once, in an order that their structure decides."""
+    """Return the Dr.Jit arrays that the package's own objects hold, each once, in an order that their structure decides.
+
+    Objects of a class that says it is `host_only` are not looked into: a street has ten thousand parts.
+    """
     import drjit as dr  # noqa: PLC0415
 
     seen: set[int] = set()
@@ -76,7 +79,7 @@ def device_arrays(*objects: Any) -> list[Any]:
         elif isinstance(value, dict):
             for name in sorted(value):
                 visit(value[name])
-        elif type(value).__module__.startswith("fullwell.render"):
+        elif type(value).__module__.startswith("fullwell.render") and not getattr(type(value), "host_only", False):
             seen.add(id(value))
             names = getattr(value, "__dict__", None) or dict.fromkeys(getattr(value, "__slots__", ()))
             for name in sorted(names):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,6 +80,8 @@ class SceneSurfaces:
     parts, materials, groups
         Shared records; `groups` are the names of light groups, in alphabetical order.
     """
+
+    host_only: ClassVar[bool] = True
 
     vertices_m: NDArray[np.float32]
     faces: NDArray[np.uint32]
