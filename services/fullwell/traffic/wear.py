@@ -34,6 +34,11 @@ _GULLY_EVERY_M: Final = 25.0
 _COVER_RADIUS_M: Final = 0.3
 _KEEP_OFF_M: Final = 4.0
 """Of the ends of lanes: stop lines and crossings."""
+_MEADOW_M: Final = 0.002
+_FIELD_M: Final = 0.004
+_PATCH_M: Final = 0.006
+"""Heights above the ground."""
+_MEADOW_OFF_M: Final = 0.3
 _HORIZON_M: Final = 9000.0
 """The flat ground goes on so far: from 1.5 m above it the horizon is then 0.6' low, a tenth of a pixel."""
 
@@ -41,12 +46,10 @@ _HORIZON_M: Final = 9000.0
 def road_wear(network: RoadNetwork, style: RoadStyle, *, seed: int) -> list[RoadSurface]:
     """Return repairs and sealed cracks of asphalt, and covers of cast iron, as surfaces of class "road"."""
     found: dict[str, list[tuple[Array, NDArray[np.int64]]]] = {}
-    if style.road != "asphalt/wet":  # a film of water makes all asphalt one
-        repair = "asphalt/worn" if style.road == "asphalt/new" else "asphalt/new"
+    if style.road == "asphalt/worn":  # a film of water makes all asphalt one, and what is new has no repairs
         for lane in network.of_kind("drive", "bus"):
             rng = stream(seed, "street", "wear", lane.id)
-            found.setdefault(repair, []).extend(_repairs(lane, rng))
-            found.setdefault("asphalt/new", []).extend(_seals(lane, rng))
+            found.setdefault("asphalt/new", []).extend([*_repairs(lane, rng), *_seals(lane, rng)])
     for lane in network.of_kind("drive"):
         if style.covers:
             found.setdefault("metal/cast_iron", []).extend(_covers(lane, stream(seed, "street", "covers", lane.id)))
@@ -57,7 +60,8 @@ def road_wear(network: RoadNetwork, style: RoadStyle, *, seed: int) -> list[Road
 
 
 def ground_cover(plan: GroundPlan, style: RoadStyle, *, seed: int) -> list[RoadSurface]:
-    """Return patches of dry grass and bare soil near roads on grassy ground, and fields farther off where the style has any."""
+    """Return what varies grassy ground: meadow that is drier than the rest, patches of dry grass and bare soil near roads, and
+    fields farther off where the style has any."""
     if not style.ground.startswith("grass"):
         return []
     roads = shapely.union_all([plan.carriageway, plan.walk])
@@ -77,8 +81,12 @@ def ground_cover(plan: GroundPlan, style: RoadStyle, *, seed: int) -> list[RoadS
             if shapely.distance(roads, polygon) < nearest_m or any(polygon.intersects(other) for other in taken):
                 continue
             taken.append(polygon)
-            raised_m = level_m + (0.004 if name == "patch" else 0.002)
+            raised_m = level_m + (_PATCH_M if name == "patch" else _FIELD_M)
             found.setdefault(material, []).append(_fan(outline, centre, plan, raised_m))
+    blots = stream(seed, "street", "ground", "meadow")
+    meadow = list(_meadow(roads, plan, style.bare_patches, level_m + _MEADOW_M, blots))
+    if meadow:
+        found["grass/meadow"] = meadow
     return [_surface("terrain", material, pieces) for material, pieces in found.items()]
 
 
@@ -167,6 +175,25 @@ def _gullies(lane: Lane, rng: np.random.Generator) -> Iterator[tuple[Array, NDAr
 
 
 # Ground --------------------------------------------------------------------------------------------------------------
+
+
+def _meadow(
+    roads: shapely.Geometry, plan: GroundPlan, wanted: int, raised_m: float, rng: np.random.Generator
+) -> Iterator[tuple[Array, NDArray[np.int64]]]:
+    """Blots of 3 to 20 m without straight sides, under patches and fields."""
+    west, south, east, north = roads.buffer(90.0, quad_segs=2).bounds
+    angle = np.linspace(0.0, 2 * np.pi, 28, endpoint=False)
+    taken: list[shapely.Polygon] = []
+    for _ in range(wanted):
+        centre, radius_m = rng.uniform([west, south], [east, north]), rng.uniform(3.0, 20.0)
+        waves = sum(rng.uniform(0.05, 0.25) * np.sin(count * angle + rng.uniform(0, 2 * np.pi)) for count in (2, 3, 5, 9))
+        reach = radius_m * (1.0 + waves)
+        outline = centre + np.column_stack([np.cos(angle) * reach, np.sin(angle) * reach * rng.uniform(0.5, 1.0)])
+        polygon = shapely.Polygon(outline)
+        free = polygon.is_valid and shapely.distance(roads, polygon) > _MEADOW_OFF_M
+        if free and not any(polygon.intersects(other) for other in taken):
+            taken.append(polygon)
+            yield _fan(outline, centre, plan, raised_m)
 
 
 def _patch(rng: np.random.Generator, centre: Array) -> tuple[Array, str]:

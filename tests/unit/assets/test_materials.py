@@ -36,7 +36,7 @@ roof: tile_red tile_dark slate metal
 wood: oak pine painted_white weathered
 bark: oak birch pine
 foliage: broadleaf birch conifer hedge dry autumn
-grass: green dry
+grass: green dry meadow
 soil: earth
 skin: light medium dark deep
 hair: black brown blond grey

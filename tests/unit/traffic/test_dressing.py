@@ -204,15 +204,24 @@ def test_a_film_of_water_hides_repairs_but_no_covers(roads: tuple[RoadNetwork, G
     assert {surface.material for surface in road_wear(roads[0], style, seed=4)} == {"metal/cast_iron"}
 
 
+def test_new_asphalt_has_no_repairs(roads: tuple[RoadNetwork, GroundPlan]) -> None:
+    style = STYLES["motorway"].surfaces
+    assert style.road == "asphalt/new"
+    assert not [surface for surface in road_wear(roads[0], style, seed=4) if surface.material.startswith("asphalt")]
+
+
 def test_bare_patches_and_fields_keep_off_roads_and_each_other(roads: tuple[RoadNetwork, GroundPlan]) -> None:
     _, plan = roads
     found = ground_cover(plan, STYLES["rural"].surfaces, seed=5)
     near = shapely.union_all([plan.carriageway, plan.walk])
-    triangles = np.concatenate([surface.vertices_m[surface.faces] for surface in found])
-    assert len(triangles) > 200
-    polygons = shapely.polygons(triangles[:, :, :2])
-    assert shapely.distance(near, polygons).min() > 0.5
-    assert shapely.union_all(polygons).area == pytest.approx(shapely.area(polygons).sum(), rel=1e-6)
+    assert {"grass/meadow", "grass/dry"} <= {surface.material for surface in found}
+    for layer, distance_m in (("meadow", 0.3), ("others", 0.5)):
+        of_layer = [surface for surface in found if (surface.material == "grass/meadow") == (layer == "meadow")]
+        triangles = np.concatenate([surface.vertices_m[surface.faces] for surface in of_layer])
+        assert len(triangles) > 200
+        polygons = shapely.polygons(triangles[:, :, :2])
+        assert shapely.distance(near, polygons).min() > distance_m
+        assert shapely.union_all(polygons).area == pytest.approx(shapely.area(polygons).sum(), rel=1e-6)
     assert ground_cover(plan, STYLES["city"].surfaces, seed=5) == []  # paved
 
 

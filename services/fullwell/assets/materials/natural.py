@@ -82,7 +82,7 @@ _WORDS: Final = {
 
 def natural_materials() -> tuple[SpectralMaterial, ...]:
     """Return the materials of roads, buildings, plants and bodies."""
-    return (*_measured(), _wet_asphalt(), *_modelled(), *_typical())
+    return (*_measured(), _wet_asphalt(), _meadow(), *_modelled(), *_typical())
 
 
 def _measured() -> Iterator[SpectralMaterial]:
@@ -110,6 +110,16 @@ def _modelled() -> Iterator[SpectralMaterial]:
         yield _material(f"skin/{name}", values, "model", SKIN_SOURCE)
     for name, mixture in _MIXTURES.items():
         yield _material(name, mixture_reflectance(mixture), "model", PIGMENT_SOURCE)
+
+
+_DRY_SHARE = 0.3
+
+
+def _meadow() -> SpectralMaterial:
+    """Green grass with dry blades between."""
+    dry, source = measured_reflectance("grass/dry")
+    mixed = (1.0 - _DRY_SHARE) * leaf_reflectance(_LEAVES["grass/green"]) + _DRY_SHARE * dry
+    return _material("grass/meadow", mixed, "model", f"{_DRY_SHARE:.0%} of {source}, the rest {LEAF_SOURCE}")
 
 
 def _wet_asphalt() -> SpectralMaterial:
