@@ -1,4 +1,4 @@
-"""Make the gallery of streets: twelve frames of different roads, styles, light and cameras, docs/images/gallery/*.jpg.
+"""Make the gallery of streets: thirteen frames of different roads, styles, light and cameras, docs/images/gallery/*.jpg.
 
 Run: python examples/make_gallery.py [--only NAME] [FOLDER]. Draws from this machine's asset store:
 fullwell assets starter --approve --no-previews
@@ -41,9 +41,8 @@ def sun(elevation_deg: float, azimuth_deg: float, turbidity: float = 3.0) -> dic
     return light | {"sun_elevation_deg": elevation_deg, "sun_azimuth_deg": azimuth_deg}
 
 
-def overcast(luminance_cd_m2: float) -> dict[str, Any]:
-    light = {"kind": "constant_environment", "name": "sky", "group": "sky"}
-    return light | {"luminance_cd_m2": luminance_cd_m2, "spd": "d65"}
+def overcast(illuminance_lux: float) -> dict[str, Any]:
+    return {"kind": "overcast_sky", "name": "sky", "group": "sky", "illuminance_lux": illuminance_lux}
 
 
 SCENES: dict[str, dict[str, Any]] = {
@@ -51,14 +50,15 @@ SCENES: dict[str, dict[str, Any]] = {
     "city-evening": {"traffic": {"network": CITY, "demand": TOWN, "ego": EGO}, "light": sun(9, 265, 4), "seed": 22},
     "city-overcast-wet": {
         "traffic": {"network": CITY, "demand": TOWN, "ego": EGO, "wet": True, "season": "autumn", "dirt": {"vehicles": 0.8}},
-        "light": overcast(2500),
+        "light": overcast(9000),
         "seed": 23,
     },
     "city-night": {
         "traffic": {"network": CITY, "demand": TOWN, "ego": EGO, "lamps": "night"},
-        "light": overcast(0.02),
+        "light": overcast(0.05),
         "seed": 10,
-        "f_number": 2.0,
+        "f_number": 1.4,
+        "exposure_ev": 1.0,
         "quality": {"max_samples_per_pixel": 512, "max_sample_saturation": 1.5},
     },
     "junction-mast": {
@@ -84,7 +84,7 @@ SCENES: dict[str, dict[str, Any]] = {
             "ego": EGO | {"min_road_ahead_m": 0},
             "time_s": 25,
         },
-        "light": sun(22, 110),
+        "light": sun(22, 200),
         "seed": 25,
     },
     "roundabout": {
@@ -113,10 +113,10 @@ SCENES: dict[str, dict[str, Any]] = {
             "time_s": 8,
             "lamps": "night",
         },
-        "light": overcast(800),
+        "light": overcast(12000),
         "atmosphere": {"kind": "fog", "visibility_m": 120},
         "seed": 28,
-        "quality": {"max_samples_per_pixel": 256},
+        "quality": {"max_samples_per_pixel": 320},
     },
     "motorway": {
         "traffic": {
@@ -128,11 +128,25 @@ SCENES: dict[str, dict[str, Any]] = {
         "light": sun(40, 230),
         "seed": 29,
     },
-    "rear-camera": {
-        "traffic": {"network": CITY, "demand": TOWN, "ego": EGO},
-        "pose": {"mount": {"at": "rear", "pitch_deg": -6}},
+    "left-mirror": {
+        "traffic": {"network": CITY, "demand": TOWN, "ego": EGO | {"show": True}},
+        "pose": {"mount": {"at": "mirror_left", "yaw_deg": 165, "pitch_deg": -8}},
         "light": sun(50, 160),
         "seed": 30,
+    },
+    "tram-dusk": {
+        "traffic": {
+            "network": CITY | {"tram_lane_width_m": 3.2},
+            "demand": TOWN | {"tram": {"rate_per_s": 0.1, "density_per_km": 8}},
+            "ego": EGO | {"min_speed_m_s": 0},
+            "lamps": "night",
+            "time_s": 60,
+        },
+        "light": sun(-2, 280),
+        "seed": 31,
+        "f_number": 1.4,
+        "exposure_ev": 1.0,
+        "quality": {"max_samples_per_pixel": 192, "max_sample_saturation": 1.5},
     },
     "own-sumo-run": {
         "traffic": {
@@ -152,14 +166,14 @@ def recipe(name: str) -> dict[str, Any]:
     """Return the recipe of a scene of the gallery."""
     scene = SCENES[name]
     pose = scene.get("pose", {"mount": {"at": "windscreen", "pitch_deg": -1}})
-    exposure = {"auto": {"method": "percentile", "level": 0.6, "percentile": 97}}
+    exposure = {"auto": {"method": "percentile", "level": 0.6, "percentile": 97, "max_time_s": 1 / 30}}
     sensor = {
         "name": "main",
         "model": "ar0132at-rgb",
         "rows": 270,
         "cols": 480,
         "exposure": exposure,
-        "isp": {"demosaic": "menon2007"},
+        "isp": {"demosaic": "menon2007", "tone": {"exposure_ev": scene.get("exposure_ev", 0.0)}},
     }
     what: dict[str, Any] = {"traffic": scene["traffic"], "lights": [scene["light"]]}
     if "atmosphere" in scene:
