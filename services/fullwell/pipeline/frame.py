@@ -5,8 +5,9 @@ from __future__ import annotations
 import dataclasses
 import importlib.metadata
 import time
+import weakref
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -313,9 +314,6 @@ def _radiance_document(images: _Images, frame: FrameDescription) -> dict[str, An
     """Return what was rendered, and how exact it is; all of it the same wherever the frame is made."""
     light = images.light
     statistics = light.statistics
-    error = light.channel_error(dict(frame.group_weights))
-    mean = light.channels(dict(frame.group_weights))
-    relative = np.divide(error, mean, out=np.zeros_like(error), where=mean > 0)
     return {
         "key": images.key,
         "variant": statistics.variant,
@@ -329,7 +327,7 @@ def _radiance_document(images: _Images, frame: FrameDescription) -> dict[str, An
         "bad_samples": statistics.bad_samples,
         "motion": _motion_document(statistics),
         "clamped_fraction": statistics.clamped_fraction,
-        "relative_standard_error_rms": float(np.sqrt(np.mean(np.square(relative)))) if relative.size else None,
+        "relative_standard_error_rms": _relative_error_rms(light, tuple(frame.group_weights)),
         "noise_target": {
             "noise_ratio": frame.quality.noise_ratio,
             "predicted_rms": statistics.noise_ratio_rms,
@@ -339,6 +337,20 @@ def _radiance_document(images: _Images, frame: FrameDescription) -> dict[str, An
             "stopped_by": statistics.stopped_by,
         },
     }
+
+
+_error_rms: weakref.WeakKeyDictionary[RenderedLight, dict[Any, float | None]] = weakref.WeakKeyDictionary()
+"""By the weights of groups: frames that vary only the sensor have the same."""
+
+
+def _relative_error_rms(light: RenderedLight, weights: tuple[Any, ...]) -> float | None:
+    """Return the rms over film samples and channels of the relative standard error; None without channels."""
+    known = _error_rms.setdefault(light, {})
+    if weights not in known:
+        error, mean = light.channel_error(dict(weights)), light.channels(dict(weights))
+        relative = np.divide(error, mean, out=np.zeros_like(error), where=mean > 0)
+        known[weights] = float(np.sqrt(np.mean(np.square(relative)))) if relative.size else None
+    return known[weights]
 
 
 def _motion_document(statistics: RenderStatistics) -> dict[str, Any] | None:
@@ -384,29 +396,30 @@ def _sensor_products(
             _add(run, f"{folder}image.png", lambda: encode.encode_rgb_png(rgb))
     if run.plan.labels:
         with run.stage(f"{rig.camera.name}/{sensor.name}: labels"):
-            labels = _labels(run, view)
+            labels, encoded = _labels(run, view)
         run.instance_table = labels.instance_table
-        _label_products(run, labels, view, rig.motion, folder)
+        _label_products(run, labels, view, rig.motion, folder, encoded)
     return document
 
 
-_kept_labels: OrderedDict[str, tuple[SceneDescription, Labels]] = OrderedDict()
-"""Labels of the last views of a scene: frames that vary only sensor noise, exposure or picture have the same."""
+_kept_labels: OrderedDict[str, tuple[SceneDescription, Labels, dict[str, bytes]]] = OrderedDict()
+"""Labels of the last views of a scene, and files of them: frames that vary only noise, exposure or picture have the same."""
 
 _MOST_KEPT_LABELS = 4
 
 
-def _labels(run: _Run, view: Camera) -> Labels:
+def _labels(run: _Run, view: Camera) -> tuple[Labels, dict[str, bytes]]:
+    """Return the labels of a view, and the files of them that were encoded before, to be added to."""
     scene = run.frame.scene
     key = digest_of([view.camera_to_world, view.tangent_pitch, view.film.rows, view.film.cols, view.lens.kind])
     kept = _kept_labels.pop(key, None)
     if kept is None or kept[0] is not scene:  # descriptions are never changed: the same object is the same scene
         hits = query_surfaces(scene, view, should_cancel=run.should_cancel)
-        kept = (scene, make_labels(scene, view, hits))
+        kept = (scene, make_labels(scene, view, hits), {})
     _kept_labels[key] = kept
     while len(_kept_labels) > _MOST_KEPT_LABELS:
         _kept_labels.popitem(last=False)
-    return kept[1]
+    return kept[1:]
 
 
 def _sensor_view(camera: Camera, model: SensorModel) -> Camera:
@@ -484,19 +497,29 @@ def _lens_document(camera: Camera) -> dict[str, Any]:
     }
 
 
-def _label_products(run: _Run, labels: Labels, view: Camera, motion: Motion, folder: str) -> None:
-    _add(run, f"{folder}depth.exr", lambda: encode.encode_depth_exr(labels.depth_z_m, labels.depth_range_m))
-    _add(run, f"{folder}coverage.png", lambda: encode.encode_coverage_png(labels.coverage))
-    _add(run, f"{folder}normals.exr", lambda: encode.encode_normals_exr(labels.normals_camera))
-    _add(run, f"{folder}flow.exr", lambda: encode.encode_flow_exr(_flow(run.frame, labels, view, motion)))
-    _add(run, f"{folder}instances.png", lambda: encode.encode_ids_png(labels.instances))
-    _add(run, f"{folder}semantic.png", lambda: encode.encode_ids_png(labels.semantic.astype(np.uint32)))
+def _label_products(  # noqa: PLR0917 - what is seen, from where, where to
+    run: _Run, labels: Labels, view: Camera, motion: Motion, folder: str, encoded: dict[str, bytes]
+) -> None:
+    def add(name: str, encoder: Callable[[], bytes], *, of_labels_alone: bool = True) -> None:
+        def once() -> bytes:
+            if name not in encoded:
+                encoded[name] = encoder()
+            return encoded[name]
+
+        _add(run, f"{folder}{name}", once if of_labels_alone else encoder)
+
+    add("depth.exr", lambda: encode.encode_depth_exr(labels.depth_z_m, labels.depth_range_m))
+    add("coverage.png", lambda: encode.encode_coverage_png(labels.coverage))
+    add("normals.exr", lambda: encode.encode_normals_exr(labels.normals_camera))
+    add("flow.exr", lambda: encode.encode_flow_exr(_flow(run.frame, labels, view, motion)), of_labels_alone=False)
+    add("instances.png", lambda: encode.encode_ids_png(labels.instances))
+    add("semantic.png", lambda: encode.encode_ids_png(labels.semantic.astype(np.uint32)))
     driving, motions = run.frame.driving, run.frame.motions
     told = motions if motions or driving is not None else None
-    _add(
-        run,
-        f"{folder}labels.json",
+    add(
+        "labels.json",
         lambda: encode.encode_json(labels_document(labels, view.intrinsics_px, view.camera_to_world, told)),
+        of_labels_alone=told is None,
     )
     if driving is not None:
         _add(run, f"{folder}driving.json", lambda: encode.encode_json(driving_document(labels, view, driving)))

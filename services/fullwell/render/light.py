@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fullwell.core.errors import FieldError, FullwellError, RenderError
+from fullwell.core.hashing import Unchanging
 from fullwell.core.rng import seed32
 from fullwell.radiometry import RadianceImage, Spectrum, WavelengthGrid
 from fullwell.render.adaptive import NoiseTarget, SamplingGoal, SamplingOutcome, sample_until
@@ -111,7 +112,7 @@ class LightRequest:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RenderedLight:
+class RenderedLight(Unchanging):
     """Light per solid angle of the pupil, as it reaches the film samples; lens effects but depth of field left out.
 
     Attributes

@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from fullwell.core.errors import CancelledError, ConflictError
 from fullwell.core.hashing import sha256_hex
 from fullwell.dataset import encode
 from fullwell.pipeline import FrameProgress, LightCache, plan_frame, render_frame, run_frame
+from fullwell.pipeline.frame import _kept_labels as kept_labels
 from fullwell.schema import build_frame, load_recipe
 from fullwell.storage import LocalStore
 
@@ -95,6 +97,24 @@ def test_another_seed_gives_another_noise_but_the_same_labels(recipe: dict[str, 
         assert one[name] != two[name]
     for name in ("labels.json", "instances.png", "depth.exr", "semantic.png", "normals.exr"):
         assert one[name] == two[name]
+
+
+def test_what_is_kept_between_frames_of_a_scene_changes_no_byte(recipe: dict[str, Any], tmp_path: Path) -> None:
+    """Labels, their files and the error of the light are worked out once for a scene, here by a frame with another sensor."""
+    longer = json.loads(json.dumps(recipe))
+    longer["cameras"][0]["sensors"][0]["exposure"] = {"time_s": 0.02}
+    frames = [build_frame(load_recipe(document), 0) for document in (recipe, longer)]
+    frames[1] = replace(frames[1], scene=frames[0].scene)
+    alone = render_frame(frames[1], LocalStore(tmp_path / "alone"), "f")
+    kept_labels.clear()
+    cache, store = LightCache(), LocalStore(tmp_path / "together")
+    first, second = (render_frame(frame, store, f"f{number}", cache=cache) for number, frame in enumerate(frames))
+    assert second["run"]["cache"][0]["source"] == "memory"
+    assert second["products"] == alone["products"] != first["products"]
+    for what in ("sensors", "camera_to_world"):
+        assert second["cameras"][0][what] == alone["cameras"][0][what]
+    error = "relative_standard_error_rms"
+    assert second["cameras"][0]["radiance"][error] == alone["cameras"][0]["radiance"][error] > 0
 
 
 def test_published_frame_is_returned_without_work(
