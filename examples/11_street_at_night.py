@@ -74,7 +74,15 @@ RECIPE: dict[str, Any] = {
         }
     },
     "outputs": ["image.png", "raw.npz", "labels.json"],
-    "quality": {"noise_ratio": 1.5, "max_samples_per_pixel": 512, "max_depth": 5},
+    # Nothing is rendered moving: exposed for a second at night and half a millisecond by day, the frames could not share one
+    # rendering.
+    "quality": {
+        "noise_ratio": 1.5,
+        "max_samples_per_pixel": 512,
+        "max_depth": 5,
+        "max_sample_saturation": 2,
+        "motion_blur_px": 1000,
+    },
 }
 
 
