@@ -11,7 +11,7 @@ from fullwell.core.settings import load_settings
 if TYPE_CHECKING:
     from fullwell.assets.store import StoredAssets
     from fullwell.pipeline import StageStore
-    from fullwell.schema import RecipeBuilder, RecipeDocument
+    from fullwell.schema import KeptScene, RecipeBuilder, RecipeDocument
     from fullwell.storage import ObjectStore
 
 __all__ = ["FrameRunner", "PipelineRunner", "Progress"]
@@ -50,12 +50,15 @@ class FrameRunner(Protocol):
 class PipelineRunner:
     """Runs frames with the real pipeline; keeps what builds the frames of the job at hand, with the models it has read.
 
+    The last scene is kept for the next job too: one that varies only its sensors does not make it again.
+
     Radiance images go to the stage cache in the store that holds the products: all workers of a service share it.
     """
 
     def __init__(self) -> None:
         self._document: RecipeDocument | None = None
         self._builder: RecipeBuilder | None = None
+        self._scene: KeptScene | None = None
         self._stages: StageStore | None = None
         self._assets: StoredAssets | None = None
 
@@ -73,13 +76,17 @@ class PipelineRunner:
         """Return the manifest of the published frame."""
         # Loads the renderer: in the process that renders, at its first frame.
         from fullwell.pipeline import StageStore, run_frame  # noqa: PLC0415
-        from fullwell.schema import RecipeBuilder  # noqa: PLC0415
+        from fullwell.schema import KeptScene, RecipeBuilder  # noqa: PLC0415
 
         if self._stages is None or self._stages.store is not store:
             limit = load_settings().cache_bytes
             self._stages = StageStore(store, max_bytes=limit) if limit else None
         if self._builder is None or self._document is not document:
-            self._document, self._builder = document, RecipeBuilder(document, base_dir=base_dir, assets=self._assets_of(store))
+            if self._scene is None:
+                self._scene = KeptScene()
+            assets = self._assets_of(store)
+            self._builder = RecipeBuilder(document, base_dir=base_dir, assets=assets, kept=self._scene)
+            self._document = document
         return run_frame(
             document,
             index,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from typing import Any, Final, Literal
 
 from fullwell.assets.classes import asset_class
@@ -154,7 +155,7 @@ class Check:
     numbers: Mapping[str, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class AssetManifest:
     """One version of an asset. Immutable: a change of any field is a new version with another digest.
 
@@ -194,7 +195,7 @@ class AssetManifest:
         asset_class(self.asset_class)
         object.__setattr__(self, "tags", check_tags(self.tags))
 
-    @property
+    @cached_property
     def digest(self) -> str:
         """SHA-256 of the canonical document: what a pin names."""
         return digest_of(self.document())

@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-import functools
-import importlib.metadata
-import json
 import math
-import platform
-import struct
 import time
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
 import structlog
-from numpy.typing import NDArray
 
-import fullwell
-from fullwell.core.hashing import canonical_json, digest_of, sha256_file
+from fullwell.core.hashing import digest_of
 from fullwell.pipeline.keys import light_key
+from fullwell.pipeline.maker import maker
+from fullwell.pipeline.packing import packed, unpacked
 from fullwell.pipeline.plan import FramePlan, PlanStep
 from fullwell.pipeline.stage_store import StageStore
 from fullwell.radiometry import WavelengthGrid
@@ -39,14 +32,11 @@ __all__ = [
 ]
 
 KIND = "light"
-_ENTRY_VERSION = 2
+_ENTRY_VERSION = 3
 _MAX_BYTES = 1 << 30
-_ALIGNMENT = 64
 _FLOAT_BYTES = 4
-_LENGTH = struct.Struct("<I")
 _MAKERS = ("core", "radiometry", "scene", "render")
 """The packages whose code decides rendered light, beside those whose versions are named."""
-_INSTRUCTION_SETS = ("fma", "avx", "avx2", "avx512f", "neon", "asimd", "sve")
 
 Shapes = tuple[tuple[int, ...], tuple[int, ...] | None]
 
@@ -205,84 +195,32 @@ def stored_light_key(key: str) -> str:
     Another version of the rendering code, of the compiler or of the instruction set rounds otherwise, so it has entries of
     its own: a hit gives the bytes that rendering here would give.
     """
-    return digest_of({"light": key, "entry_version": _ENTRY_VERSION, "maker": _maker()})
-
-
-@functools.cache
-def _maker() -> dict[str, Any]:
-    root = Path(fullwell.__file__).parent
-    files = sorted(file for package in _MAKERS for file in (root / package).rglob("*.py"))
-    return {
-        "code": digest_of([[file.relative_to(root).as_posix(), sha256_file(file)] for file in files]),
-        "versions": {name: importlib.metadata.version(name) for name in ("mitsuba", "drjit", "numpy")},
-        "llvm": choose_variant().llvm_version,
-        "machine": platform.machine(),
-        "instruction_sets": _instruction_sets(),
-    }
-
-
-def _instruction_sets() -> list[str]:
-    """Return those of the instruction sets that change rounding or the order of sums which this processor has."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return [platform.processor()]
-    flags = next((line.partition(":")[2].split() for line in lines if line.startswith(("flags", "Features"))), [])
-    return [name for name in _INSTRUCTION_SETS if name in flags]
+    return digest_of({"light": key, "entry_version": _ENTRY_VERSION, "maker": maker(_MAKERS)})
 
 
 def encode_light(light: RenderedLight) -> tuple[bytes | memoryview, ...]:
-    """Return an exact encoding, in parts to be joined: length and JSON of the header, then the arrays as they are.
-
-    Nothing is compressed: half of a Monte-Carlo image's bits are noise, and saving a fifth of the size costs twenty times
-    the time of writing it. The header is padded, so that the arrays lie aligned.
-    """
-    replicas, bands = _shapes(light)
-    header = canonical_json(
-        {
-            "replicas": list(replicas),
-            "bands": None if bands is None else list(bands),
-            "groups": list(light.groups),
-            "grid": [light.grid.first_nm, light.grid.last_nm, light.grid.step_nm],
-            "tangent_pitch": light.tangent_pitch,
-            "statistics": asdict(light.statistics),
-        }
-    )
-    header += b" " * (-(_LENGTH.size + len(header)) % _ALIGNMENT)
-    arrays = [light.replicas] if light.bands is None else [light.replicas, light.bands]
-    return _LENGTH.pack(len(header)), header, *(_view_of(array) for array in arrays)
+    """Return an exact encoding, in parts to be joined."""
+    document = {
+        "groups": list(light.groups),
+        "grid": [light.grid.first_nm, light.grid.last_nm, light.grid.step_nm],
+        "tangent_pitch": light.tangent_pitch,
+        "statistics": asdict(light.statistics),
+    }
+    return packed(document, {"replicas": light.replicas} | ({} if light.bands is None else {"bands": light.bands}))
 
 
 def decode_light(content: bytes | memoryview) -> RenderedLight:
     """Return what was encoded, bit for bit, in arrays of its own. Raises an error of any kind for other content."""
-    content = memoryview(content)
-    (length,) = _LENGTH.unpack_from(content)
-    header = json.loads(bytes(content[_LENGTH.size : _LENGTH.size + length]))
-    shapes = [tuple(int(n) for n in header[name]) for name in ("replicas", "bands") if header[name] is not None]
-    at = _LENGTH.size + length
-    if len(content) != at + _FLOAT_BYTES * sum(math.prod(shape) for shape in shapes):
-        raise ValueError(f"{len(content)} bytes do not hold arrays of the shapes {shapes}")
-    arrays = []
-    for shape in shapes:
-        flat = np.frombuffer(content, dtype="<f4", count=math.prod(shape), offset=at)
-        arrays.append(flat.reshape(shape).astype(np.float32))
-        at += flat.nbytes
-    first_nm, last_nm, step_nm = header["grid"]
+    document, arrays = unpacked(content)
+    first_nm, last_nm, step_nm = document["grid"]
     return RenderedLight(
-        replicas=arrays[0],
-        bands=arrays[1] if header["bands"] is not None else None,
-        groups=tuple(header["groups"]),
+        replicas=arrays["replicas"],
+        bands=arrays.get("bands"),
+        groups=tuple(document["groups"]),
         grid=WavelengthGrid(first_nm, last_nm, step_nm),
-        tangent_pitch=header["tangent_pitch"],
-        statistics=RenderStatistics(**header["statistics"]),
+        tangent_pitch=document["tangent_pitch"],
+        statistics=RenderStatistics(**document["statistics"]),
     )
-
-
-def _view_of(array: NDArray[np.float32]) -> memoryview:
-    if array.dtype != np.float32:
-        raise TypeError(f"the array is {array.dtype}; must be float32")
-    contiguous = np.ascontiguousarray(array, dtype="<f4")
-    return contiguous.reshape(-1).view(np.uint8).data
 
 
 def _shapes(light: RenderedLight) -> Shapes:

@@ -6,7 +6,6 @@ import dataclasses
 import importlib.metadata
 import time
 import weakref
-from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fullwell.core.errors import CancelledError, ConflictError, NotFoundError
-from fullwell.core.hashing import digest_of, sha256_hex
+from fullwell.core.hashing import sha256_hex
 from fullwell.core.rng import seed32, stream
 from fullwell.dataset import encode
 from fullwell.dataset.dng import check_dng_pattern, encode_raw_dng
@@ -24,6 +23,7 @@ from fullwell.labels import Labels, driving_document, labels_document, make_labe
 from fullwell.optics import OpticsOptions
 from fullwell.pipeline.cache import LightCache, ObtainedLight, obtain_light
 from fullwell.pipeline.camera_chain import develop_picture, form_channels, form_image, take_picture
+from fullwell.pipeline.kept_labels import KeptLabels, labels_of
 from fullwell.pipeline.keys import frame_digest, light_key
 from fullwell.pipeline.lighting import LightPlan
 from fullwell.pipeline.noise import SensorNoise
@@ -39,7 +39,7 @@ from fullwell.render import (
     render_light,
     tile_errors,
 )
-from fullwell.scene import Camera, ConstantEnvironment, Film, ImageEnvironment, SceneDescription, SunSky
+from fullwell.scene import Camera, ConstantEnvironment, Film, ImageEnvironment, SunSky
 from fullwell.scene.images import OpticalImage, RawImage
 from fullwell.scene.motion import Motion
 from fullwell.schema.frame import CameraRig, FrameDescription, SensorRig
@@ -306,8 +306,12 @@ def _light(run: _Run, rig: CameraRig, plan: LightPlan, base: float, share: float
 
 
 def _reuse_note(camera: str, key: str, obtained: ObtainedLight) -> str:
-    source = "an earlier frame of this run" if obtained.source == "memory" else "the stage cache"
+    source = _source_note(obtained.source)
     return f"{camera}: light reused from {source} (key {key[:12]}); rendering it took {obtained.light.statistics.wall_s:.3g} s"
+
+
+def _source_note(source: str) -> str:
+    return "an earlier frame of this run" if source == "memory" else "the stage cache"
 
 
 def _radiance_document(images: _Images, frame: FrameDescription) -> dict[str, Any]:
@@ -396,30 +400,23 @@ def _sensor_products(
             _add(run, f"{folder}image.png", lambda: encode.encode_rgb_png(rgb))
     if run.plan.labels:
         with run.stage(f"{rig.camera.name}/{sensor.name}: labels"):
-            labels, encoded = _labels(run, view)
-        run.instance_table = labels.instance_table
-        _label_products(run, labels, view, rig.motion, folder, encoded)
+            kept = _labels(run, view, f"{rig.camera.name}/{sensor.name}")
+        run.instance_table = kept.labels.instance_table
+        _label_products(run, kept.labels, view, rig.motion, folder, kept.files)
     return document
 
 
-_kept_labels: OrderedDict[str, tuple[SceneDescription, Labels, dict[str, bytes]]] = OrderedDict()
-"""Labels of the last views of a scene, and files of them: frames that vary only noise, exposure or picture have the same."""
-
-_MOST_KEPT_LABELS = 4
-
-
-def _labels(run: _Run, view: Camera) -> tuple[Labels, dict[str, bytes]]:
-    """Return the labels of a view, and the files of them that were encoded before, to be added to."""
+def _labels(run: _Run, view: Camera, name: str) -> KeptLabels:
+    """Return the labels of a view."""
     scene = run.frame.scene
-    key = digest_of([view.camera_to_world, view.tangent_pitch, view.film.rows, view.film.cols, view.lens.kind])
-    kept = _kept_labels.pop(key, None)
-    if kept is None or kept[0] is not scene:  # descriptions are never changed: the same object is the same scene
-        hits = query_surfaces(scene, view, should_cancel=run.should_cancel)
-        kept = (scene, make_labels(scene, view, hits), {})
-    _kept_labels[key] = kept
-    while len(_kept_labels) > _MOST_KEPT_LABELS:
-        _kept_labels.popitem(last=False)
-    return kept[1:]
+
+    def make() -> Labels:
+        return make_labels(scene, view, query_surfaces(scene, view, should_cancel=run.should_cancel))
+
+    kept = labels_of(scene, view, make, stages=run.stage_store)
+    if kept.source != "made":
+        run.notes.append(f"{name}: labels reused from {_source_note(kept.source)}")
+    return kept
 
 
 def _sensor_view(camera: Camera, model: SensorModel) -> Camera:

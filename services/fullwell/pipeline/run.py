@@ -9,13 +9,16 @@ from fullwell.pipeline.cache import LightCache
 from fullwell.pipeline.frame import render_frame
 from fullwell.pipeline.progress import CancelCheck, FrameProgress, ProgressCallback
 from fullwell.pipeline.stage_store import StageStore
-from fullwell.schema import RecipeBuilder, RecipeDocument
+from fullwell.schema import KeptScene, RecipeBuilder, RecipeDocument
 from fullwell.storage import ObjectStore
 
 __all__ = ["run_frame"]
 
 _process_cache = LightCache()
 """One per process: successive frames of a job that share their radiance render once."""
+
+_process_scene = KeptScene()
+"""One per process: successive recipes of the same scene make it once."""
 
 
 def run_frame(
@@ -40,7 +43,7 @@ def run_frame(
     """
     if progress is not None:
         progress(FrameProgress("load", 0.0))
-    frame = (builder or RecipeBuilder(document, base_dir=base_dir)).frame(index)
+    frame = (builder or RecipeBuilder(document, base_dir=base_dir, kept=_process_scene)).frame(index)
     return render_frame(
         frame, store, prefix, cache=_process_cache, stages=stages, skip=skip, progress=progress, should_cancel=should_cancel
     )

@@ -2,11 +2,13 @@
 
 from fullwell.schema.building import RecipeBuilder, build_frame, frame_document, validate
 from fullwell.schema.errors import Problem, RecipeError
+from fullwell.schema.kept_scene import KeptScene
 from fullwell.schema.loading import load_recipe
 from fullwell.schema.paths import apply_override
 from fullwell.schema.v1.recipe import RecipeDocument
 
 __all__ = [
+    "KeptScene",
     "Problem",
     "RecipeBuilder",
     "RecipeDocument",

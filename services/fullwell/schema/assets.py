@@ -21,6 +21,7 @@ __all__ = [
     "StoredAssetFiles",
     "asks_for_assets",
     "candidates_of",
+    "is_pinned",
     "no_candidate",
     "pin_assets",
     "pins_of",
@@ -94,6 +95,11 @@ def pin_assets(document: RecipeDocument, source: AssetSource) -> RecipeDocument:
     pinned = document.model_copy(update={"assets": pins})
     pinned._base_dir = document.base_dir
     return pinned
+
+
+def is_pinned(document: RecipeDocument) -> bool:
+    """Return whether a recipe holds the candidates of all its draws."""
+    return all(query.key in document.assets for _, query in _queries(document))
 
 
 def asks_for_assets(document: RecipeDocument) -> bool:

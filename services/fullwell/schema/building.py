@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from fullwell.core.errors import FieldError
 from fullwell.core.hashing import canonical_json, digest_of
 from fullwell.schema.errors import RecipeError
+from fullwell.schema.kept_scene import KeptScene
 from fullwell.schema.loading import document_of
 from fullwell.schema.paths import with_values
 from fullwell.schema.v1.recipe import LabelsDocument, QualityDocument, RecipeDocument
@@ -89,16 +90,25 @@ def _without_vary(document: RecipeDocument) -> RecipeDocument:
 
 
 class RecipeBuilder:
-    """Builds the frames of one recipe; model files and digests are kept between frames."""
+    """Builds the frames of one recipe; model files and digests are kept between frames.
+
+    `kept` is for builders of several recipes with the same scene: see `KeptScene`.
+    """
 
     def __init__(
-        self, document: RecipeDocument, *, base_dir: Path | None = None, assets: StoredAssetFiles | None = None
+        self,
+        document: RecipeDocument,
+        *,
+        base_dir: Path | None = None,
+        assets: StoredAssetFiles | None = None,
+        kept: KeptScene | None = None,
     ) -> None:
         self._document = document
         self._base_dir = document.base_dir if base_dir is None else base_dir
         self._assets = assets
         self._files: RecipeFiles | None = None
-        self._last_scene: tuple[bytes, PlacedScene, Context] | None = None
+        self._kept = kept or KeptScene()
+        self._kept_elsewhere = kept is not None
         self._views: list[tuple[tuple[Film, View], ...]] | None = None
 
     def frame(self, index: int) -> FrameDescription:
@@ -194,6 +204,7 @@ class RecipeBuilder:
         cameras: tuple[CameraRig, ...],
     ) -> tuple[PlacedScene, Context]:
         """Return the scene, the very object of the frame before where it is the same: what was loaded of it is used again."""
+        from fullwell.schema.assets import is_pinned  # noqa: PLC0415
         from fullwell.schema.conversion.context import Context  # noqa: PLC0415
         from fullwell.schema.conversion.scenes import scene_of  # noqa: PLC0415
 
@@ -205,11 +216,15 @@ class RecipeBuilder:
         viewpoints = _viewpoints(cameras) if street is not None else ()
         if street is not None:
             contents |= {"seed": recipe.seed, "assets": plain.get("assets"), "views": [repr(view) for view in viewpoints]}
+        # Draws from whatever the store has at the moment are not another recipe's to use.
+        kept = self._kept if not self._kept_elsewhere or is_pinned(recipe) else KeptScene()
         key = canonical_json(contents)
-        if self._last_scene is None or self._last_scene[0] != key:
+        known = kept.get(key, self._files)
+        if known is None:
             context = Context(grid, self._files, self._assets, recipe, recipe.seed, street=street)
-            self._last_scene = (key, scene_of(recipe.scene, context, viewpoints), context)
-        return self._last_scene[1:]
+            known = scene_of(recipe.scene, context, viewpoints), context
+            kept.put(key, *known)
+        return known
 
     def _shared_views(self, context: Context) -> list[tuple[tuple[Film, View], ...]]:
         """Return the views that frames of the recipe have, for each camera with the film it is on; none if `vary` changes none.

@@ -118,6 +118,7 @@ class Street:
 
     def __init__(self, spec: StreetSpec, shelf: AssetShelf, *, path: str = "scene.traffic") -> None:
         self.spec, self._shelf, self._path = spec, shelf, path
+        self._last_moment: tuple[int, StreetMoment] | None = None
         self._style = replace(street_style(spec.style, path=f"{path}.style"), season=spec.season)
         self.network: RoadNetwork = read_network(make_network(spec.network, path=f"{path}.network"), path=f"{path}.network")
         self.plan: GroundPlan = ground_plan(self.network)
@@ -274,7 +275,12 @@ class Street:
         return best
 
     def moment(self, number: int) -> StreetMoment:
-        """Return the street at the time of that number in the spec."""
+        """Return the street at the time of that number in the spec; the last one is kept."""
+        if self._last_moment is None or self._last_moment[0] != number:
+            self._last_moment = number, self._moment(number)
+        return self._last_moment[1]
+
+    def _moment(self, number: int) -> StreetMoment:
         frame = self.run.frames[number]
         movers, notes, overlapping = self._movers(frame)
         standing = [self._signalled(item, frame.signals) for item in self.standing]

@@ -17,7 +17,7 @@ from fullwell.core.errors import CancelledError, ConflictError
 from fullwell.core.hashing import sha256_hex
 from fullwell.dataset import encode
 from fullwell.pipeline import FrameProgress, LightCache, plan_frame, render_frame, run_frame
-from fullwell.pipeline.frame import _kept_labels as kept_labels
+from fullwell.pipeline.kept_labels import _last as kept_labels
 from fullwell.schema import build_frame, load_recipe
 from fullwell.storage import LocalStore
 

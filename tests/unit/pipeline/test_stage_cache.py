@@ -260,9 +260,9 @@ def test_another_seed_or_scene_renders_anew(recipe: dict[str, Any], tmp_path: Pa
 def test_other_rendering_code_has_entries_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     before = stored_light_key(KEY)
     assert before == stored_light_key(KEY)
-    maker = cache_module._maker()
+    maker = cache_module.maker(("core",))
     for name, other in (("code", "0" * 64), ("llvm", "1.0"), ("instruction_sets", []), ("versions", {"mitsuba": "0"})):
-        monkeypatch.setattr(cache_module, "_maker", lambda name=name, other=other: maker | {name: other})
+        monkeypatch.setattr(cache_module, "maker", lambda _, name=name, other=other: maker | {name: other})
         assert stored_light_key(KEY) != before
 
 
