@@ -26,8 +26,8 @@ demo: $(STAMPS)/runtime $(STAMPS)/libraries ## Render the first example and say 
 test: prepare ## Lint, types, layers, then every test
 	$(BIN)/pytest -n $(JOBS)
 
-quick: setup ## The tests that take seconds
-	$(BIN)/pytest -n $(JOBS) -m "not slow and not service"
+quick: setup tools ## All tests but the slow ones: minutes
+	$(BIN)/pytest -n $(JOBS) --dist loadfile -m "not slow"
 
 prepare: setup tools lint
 

@@ -21,6 +21,11 @@ sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 
+_BEFORE_PRINTING = structlog.get_config()["processors"][:-1]
+_PRINTING = structlog.dev.ConsoleRenderer(exception_formatter=structlog.dev.plain_traceback)
+"""The default one shows each frame's variables: of a test client's fifty frames that takes eight seconds."""
+
+
 def pytest_collection() -> None:
     """Collect tests without rounds of the garbage collector: next to nothing of what is made is garbage."""
     gc.disable()
@@ -39,8 +44,9 @@ def pytest_collection_finish() -> None:
 
 @pytest.fixture(autouse=True)
 def logs_end_with_their_test() -> Iterator[None]:
-    """Undo what a command or process set up for logs in this process: its stream is the test's, and is closed after it."""
+    """Print logs plainly; undo what a command or process set up for them: its stream is the test's, and is closed after it."""
     handlers, level = logging.root.handlers[:], logging.root.level
+    structlog.configure(processors=[*_BEFORE_PRINTING, _PRINTING])
     yield
     structlog.reset_defaults()
     logging.root.handlers[:] = handlers

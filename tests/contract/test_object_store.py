@@ -428,5 +428,6 @@ def test_a_server_that_is_not_there_is_an_error_within_seconds(ask: Callable[[Ob
     _fails_as_unreachable(f"127.0.0.1:{free_port()}", ask)
 
 
+@pytest.mark.slow
 def test_a_server_that_never_answers_is_an_error_within_seconds(silent_address: str) -> None:
     _fails_as_unreachable(silent_address, lambda store: store.get("k"))

@@ -148,6 +148,7 @@ def test_lease_of_a_dead_worker_is_taken_over(store: ObjectStore) -> None:
     assert not store.exists(lease)
 
 
+@pytest.mark.slow
 def test_lease_of_a_living_worker_outlasts_its_term_and_is_waited_for_no_longer_than_the_bound(store: ObjectStore) -> None:
     holder = StageStore(store, max_bytes=LIMIT, lease_s=0.6)
     other = StageStore(store, max_bytes=LIMIT, lease_s=2.0, wait_s=4.5)
@@ -203,6 +204,7 @@ def test_entry_above_the_limit_is_not_kept(store: ObjectStore) -> None:
     assert stages.get("radiance", key_of(1)) is not None
 
 
+@pytest.mark.slow
 def test_readers_writers_and_sweepers_at_once_see_whole_entries_or_none(store: ObjectStore) -> None:
     """Each thread is a worker of its own; the limit holds a quarter of what they use, so entries vanish all the time."""
 

@@ -177,6 +177,7 @@ def check_equal_within_noise(one: np.ndarray, other: np.ndarray, variance: np.nd
 # Weights of light groups ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_other_weights_cost_no_rendering_and_equal_a_rendering_of_their_own(
     recipe: dict[str, Any], tmp_path: Path, renders: list[int]
 ) -> None:

@@ -87,6 +87,7 @@ def test_polynomials_have_the_osa_forms(index: int, formula) -> None:
     np.testing.assert_allclose(zernike(index, rho, theta), formula(rho, theta), atol=10 * ROUNDING)
 
 
+@pytest.mark.slow
 def test_polynomials_are_orthonormal_over_the_disc() -> None:
     x = (np.arange(1200) + 0.5) / 600 - 1
     rho, theta = np.hypot(x[:, None], x), np.arctan2(-x[:, None], x)

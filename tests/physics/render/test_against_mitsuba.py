@@ -36,12 +36,10 @@ SHARPEST = 0.02
 
 QUICK = (
     "diffuse_box",
-    "rough_copper",
     "point_and_spot",
     "directional",
     "constant_environment",
     "image_environment",
-    "ball_by_a_bulb",
 )
 """Scenes for the quick run: a material with lobes, every kind of light but the sun, and the cheapest of their kind."""
 
@@ -121,6 +119,7 @@ def test_same_bytes_for_one_thread_and_for_four() -> None:
         np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.slow
 def test_scenes_of_one_kind_share_recordings_but_nothing_else() -> None:
     """As in a worker, which renders one job after the other: what other tests have left in this process is no part of it."""
     here = Path(__file__).resolve()

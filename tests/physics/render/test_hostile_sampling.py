@@ -150,6 +150,7 @@ def fireflies() -> SceneDescription:
     return SceneDescription((ground(), mirror, sun), (bulb,))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("clamp", [0.3, 1.0, 3.0])
 def test_clamped_fraction_is_the_light_that_is_missing(clamp: float) -> None:
     free = even(fireflies(), 1024)

@@ -22,7 +22,24 @@ from fullwell.scene.validate import check_camera
 HERE = Path(__file__).parent
 
 
-@pytest.mark.parametrize("case", [pytest.param(case, id=case.id) for case in HOSTILE if not case.may_kill])
+SLOW = (
+    "frosted glass of roughness 1",
+    "fog of 1 m that only scatters, in a furnace",
+    "flint glass in water",
+    "principled metal of roughness 1",
+    "closed furnace with glass, mirror and white",
+)
+"""Take more than two seconds."""
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(case, id=case.id, marks=pytest.mark.slow if case.id in SLOW else ())
+        for case in HOSTILE
+        if not case.may_kill
+    ],
+)
 def test_hostile_scene_ends_in_a_correct_image_or_one_clear_error(case: Hostile) -> None:
     check(case)
 
@@ -35,14 +52,8 @@ def survives(*cases: Hostile) -> None:
     assert ended.returncode == 0, f"exit code {ended.returncode}: {ended.stderr[-2000:]}"
 
 
-@pytest.mark.parametrize(
-    "case",
-    [
-        pytest.param(case, id=case.id, marks=pytest.mark.slow if "10,000 lamps" in case.id else ())
-        for case in HOSTILE
-        if case.may_kill and not case.refused
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("case", [pytest.param(case, id=case.id) for case in HOSTILE if case.may_kill and not case.refused])
 def test_scene_that_might_kill_the_process_does_not(case: Hostile) -> None:
     survives(case)
 

@@ -130,6 +130,7 @@ def test_a_street_looks_the_same_without_what_is_far_behind() -> None:
     assert np.all(np.abs(apart) <= allowed[:, None] + STANDARD_ERRORS * error)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reflectance", [0.1, 0.3])
 def test_things_near_by_change_no_more_than_their_bound(reflectance: float) -> None:
     """Things are taken away that the planner keeps: what that changes is seen, and below the bound."""
@@ -149,6 +150,7 @@ def test_things_near_by_change_no_more_than_their_bound(reflectance: float) -> N
     assert np.any(np.abs(apart) > STANDARD_ERRORS * error), "the test would notice a change"
 
 
+@pytest.mark.slow
 def test_a_dark_room_looks_the_same_with_shorter_paths() -> None:
     corners = [[-0.5, 3.5, 3.9], [-0.5, 4.5, 3.9], [0.5, 4.5, 3.9], [0.5, 3.5, 3.9]]
     panel = {"kind": "quad", "corners_m": corners}

@@ -85,6 +85,7 @@ def check(raw: RawImage) -> None:
     assert raw.black_level_dn < raw.white_level_dn
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=120)
 @given(
     name=st.sampled_from(sensor_names()),

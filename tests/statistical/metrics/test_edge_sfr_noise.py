@@ -14,6 +14,7 @@ Z_LIMIT = 4.0
 """Standard errors; a fair test fails once in 16 000."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step_over_noise", [20.0, 8.0])
 def test_mtf50_of_noisy_edges_scatters_about_the_true_one(step_over_noise: float) -> None:
     row, col = np.mgrid[:100, :80]

@@ -49,6 +49,7 @@ def damaged(content: bytes, rng: random.Random) -> bytes:
     return bytes(changed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".glb", ".obj", ".ply", ".stl", ".usda", ".usdc"])
 def test_damaged_files_are_read_or_refused(suffix: str, tmp_path: Path) -> None:
     whole = tmp_path / f"whole{suffix}"

@@ -46,6 +46,7 @@ def test_every_glb_sample_is_read(samples: Path) -> None:
         assert all(part.base_color_texture is not None for part in model.parts)
 
 
+@pytest.mark.slow
 def test_every_usd_sample_with_geometry_is_read(samples: Path) -> None:
     kit = samples / "usd_mini_car_kit"
     files = sorted(file for file in kit.rglob("*.usd*") if file.parent.name != "materials")

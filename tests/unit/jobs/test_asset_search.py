@@ -92,6 +92,7 @@ QUERIES = st.builds(
 SETTINGS = settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
+@pytest.mark.slow
 @SETTINGS
 @given(query=QUERIES)
 def test_a_search_finds_exactly_what_matches(library: AssetLibrary, query: AssetQuery) -> None:

@@ -78,6 +78,7 @@ def test_any_scene_gives_finite_light_and_keeps_its_sum(
     np.testing.assert_allclose(np.sum(optical.photons, axis=(0, 1), dtype=np.float64), expected, rtol=ENERGY_TOLERANCE)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(
     rows=st.integers(1, 12),
@@ -97,6 +98,7 @@ def test_a_uniform_scene_stays_uniform_through_every_lens(
     np.testing.assert_allclose(found, 10.0**exponent * on_axis_factor_sr(lens, ONE_BAND)[0], rtol=UNIFORM_TOLERANCE)
 
 
+@pytest.mark.slow
 @settings(max_examples=20, deadline=None)
 @given(scale=st.floats(1e-6, 1e6), name=st.sampled_from(sorted(OPTIONS)), seed=st.integers(0, 9))
 def test_twice_the_light_gives_twice_the_image(scale: float, name: str, seed: int) -> None:

@@ -38,6 +38,7 @@ BLURS: list[dict[str, Any]] = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("blur", BLURS, ids=["zernike", "dioptre", "gaussian", "disc"])
 def test_blur_of_the_lens_lowers_contrast_and_keeps_the_light(
     recipe: dict[str, Any], tmp_path: Path, blur: dict[str, Any]
@@ -49,6 +50,7 @@ def test_blur_of_the_lens_lowers_contrast_and_keeps_the_light(
     assert blurred.mean() == pytest.approx(sharp.mean(), rel=0.02)
 
 
+@pytest.mark.slow
 def test_aperture_blades_and_dust_spread_light(recipe: dict[str, Any], tmp_path: Path) -> None:
     cache = LightCache()
     clean = irradiance(recipe, tmp_path, cache=cache)

@@ -214,6 +214,7 @@ def test_lens_blur_renders_nothing_where_the_spectrum_is_kept(
     check_that_change_renders_nothing(recipe, tmp_path, renders, change_lens_blur, ["raw.npz", "image.png", "radiance.exr"])
 
 
+@pytest.mark.slow
 def test_lenses_that_need_the_spectrum_share_one_rendering(recipe: dict[str, Any], tmp_path: Path, renders: list[int]) -> None:
     change_lens_blur(recipe["cameras"][0])
 

@@ -124,6 +124,7 @@ def test_haze_takes_from_the_sun_and_gives_to_the_sky() -> None:
     assert np.all(np.diff([sky.sky_irradiance()[15:] for sky in skies], axis=0) > 0)
 
 
+@pytest.mark.slow
 def test_light_is_smooth_in_the_suns_elevation() -> None:
     elevations_deg = np.arange(0.0, 90.1, 2.0)
     irradiance = np.log([_sky(elevation_deg).sky_irradiance()[[5, 20, 40]] for elevation_deg in elevations_deg])

@@ -53,7 +53,9 @@ def test_another_scene_or_other_bands_are_made_anew(recipe: dict[str, Any]) -> N
     kept = KeptScene()
     first = RecipeBuilder(load_recipe(recipe), kept=kept).frame(0)
     other = copy.deepcopy(recipe)
-    other["scene"]["lights"].append({"kind": "point", "name": "p", "position_m": [0, 0, 3], "luminous_intensity_cd": 5, "spd": "A"})
+    other["scene"]["lights"].append(
+        {"kind": "point", "name": "p", "position_m": [0, 0, 3], "luminous_intensity_cd": 5, "spd": "A"}
+    )
     assert len(RecipeBuilder(load_recipe(other), kept=kept).frame(0).scene.lights) == len(first.scene.lights) + 1
     assert RecipeBuilder(load_recipe(recipe | {"spectral": {"step_nm": 20}}), kept=kept).frame(0).scene is not first.scene
 

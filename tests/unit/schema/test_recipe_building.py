@@ -208,6 +208,7 @@ def test_an_overcast_sky_without_one_brightness_is_refused(recipe: dict[str, Any
         _light(recipe, kind="overcast_sky", **given)
 
 
+@pytest.mark.slow
 def test_twilight_has_no_sun_and_gets_darker_smoothly_to_the_published_levels(recipe: dict[str, Any]) -> None:
     """Glossary of Meteorology: 2 to 3.5 lx at the end of civil, 0.008 at that of nautical, 0.0006 of astronomical twilight."""
     lux = []

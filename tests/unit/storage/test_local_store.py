@@ -63,6 +63,7 @@ def test_deleting_removes_folders_that_became_empty(tmp_path: Path) -> None:
     assert list((tmp_path / "root").iterdir()) == []
 
 
+@pytest.mark.slow
 def test_writers_survive_a_deleter_that_removes_their_folder(tmp_path: Path) -> None:
     store = LocalStore(tmp_path)
     done = threading.Event()

@@ -197,6 +197,7 @@ def test_a_preset_brings_as_many_as_its_rates_say() -> None:
     assert levels[0] < levels[2]
 
 
+@pytest.mark.slow
 def test_a_city_where_roads_meet_does_not_stand_still() -> None:
     for layout, meets in (("straight", False), ("curve", False), ("motorway", False), ("cross", True), ("roundabout", True)):
         assert network_of(layout, CrossSection()).has_junctions == meets

@@ -114,6 +114,7 @@ def blocks(images: list[NDArray[np.float64]]) -> NDArray[np.float64]:
     return np.stack(images).reshape(len(images), ROWS // 8, 8, COLS // 8, 8).mean(axis=(2, 4)).reshape(len(images), -1)
 
 
+@pytest.mark.slow
 def test_fog_agrees_with_volpath_within_the_noise_of_both() -> None:
     mi = activate()
     mine, other = blocks([ours(seed) for seed in range(RUNS)]), blocks([theirs(mi, seed) for seed in range(RUNS)])

@@ -47,6 +47,7 @@ def test_every_sample_is_taken_in(samples: Path, folder: str, count: int) -> Non
         sound(prepare_file(sample.folder, sample.main, sample.options, isolated=True))
 
 
+@pytest.mark.slow
 def test_every_model_of_the_sumo_package_is_taken_in() -> None:
     found = [sample for sample in packaged_samples() if sample.name != "tram"]
     if not found:

@@ -109,6 +109,7 @@ def test_a_process_that_died_while_idle_is_replaced_without_a_word(process: Inge
     assert process.prepare(ball, "ball.glb", OPTIONS).manifest.levels
 
 
+@pytest.mark.slow
 def test_a_file_that_needs_too_much_memory_is_told_so(temporary: Path, tmp_path: Path) -> None:
     folder = tmp_path / "large"
     folder.mkdir()
@@ -157,6 +158,7 @@ def test_a_file_that_takes_too_long_is_ended(temporary: Path, ball: Path) -> Non
     assert list(temporary.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_too_much_processor_time_ends_it_too(temporary: Path, tmp_path: Path) -> None:
     folder = tmp_path / "long"
     folder.mkdir()
@@ -181,6 +183,7 @@ def test_cancelling_ends_it(process: IngestProcess, ball: Path) -> None:
     assert caught.value.cause == "cancelled"
 
 
+@pytest.mark.slow
 def test_after_its_share_the_process_is_replaced(temporary: Path, ball: Path) -> None:
     with IngestProcess(IngestLimits(max_assets=2)) as process:
         pids = []
@@ -259,6 +262,7 @@ def taken_or_refused(samples: Path, count: int, seed: int) -> None:
     assert any(o.result == "ingested" for o in outcomes)
 
 
+@pytest.mark.slow
 def test_forty_damaged_samples_are_taken_in_or_refused(samples: Path, temporary: Path) -> None:
     taken_or_refused(samples, 40, SEED)
     assert list(temporary.iterdir()) == []
