@@ -15,6 +15,8 @@ from fullwell.assets.starter.building import BuiltAsset, StarterEntry
 from fullwell.assets.starter.living import LIVING
 from fullwell.assets.starter.shapes import Shape
 
+pytestmark = pytest.mark.slow  # fifty bodies and plants are built
+
 GROUND_M = 1e-9
 TRIANGLES = {
     "pedestrian": (25_000, 110_000),

@@ -16,6 +16,8 @@ from fullwell.assets.starter.building import BuiltAsset
 from fullwell.assets.starter.two_wheelers import BICYCLE_KINDS, bicycle_shape
 from fullwell.assets.starter.vehicles import VEHICLES
 
+pytestmark = pytest.mark.slow  # forty vehicles are built
+
 Array = NDArray[np.float64]
 
 ALL = tuple(entry.id for entry in VEHICLES)
