@@ -60,6 +60,8 @@ def stage_times() -> Iterator[StageTimes]:
         (frames, "plan_frame", "plan"),
         (loading, "collect_surfaces", "collect surfaces"),
         (loading, "Geometry", "acceleration"),
+        (progressive, "collect_surfaces", "collect surfaces"),
+        (progressive, "Geometry", "acceleration"),
         (progressive, "MaterialTable", "materials"),
         (progressive, "LightSet", "lights"),
         (light, "ProgressiveImage", "other set-up"),

@@ -34,7 +34,9 @@ ORDER = (
     "plan",
     "render: surfaces",
     "render: acceleration",
+    "render: lights, materials",
     "render: rays",
+    "render: the rest",
     "optics",
     "sensor",
     "isp",
@@ -82,7 +84,9 @@ def by_stage(manifest: dict[str, Any], times: StageTimes, whole_cpu_s: float) ->
     found["render: surfaces"] = inner.get("collect surfaces", 0.0)
     found["render: acceleration"] = inner.get("acceleration", 0.0)
     rendered = sum(entry["cpu_s"] for entry in manifest["run"]["stages"] if entry["stage"].endswith(": render"))
-    found["render: rays"] = rendered - found["render: surfaces"] - found["render: acceleration"]
+    found["render: lights, materials"] = inner.get("lights", 0.0) + inner.get("materials", 0.0)
+    found["render: rays"] = inner.get("launches", 0.0)
+    found["render: the rest"] = rendered - sum(time for name, time in found.items() if name.startswith("render: "))
     for entry in manifest["run"]["stages"]:
         last = entry["stage"].rpartition(": ")[2]
         name = "encode" if entry["stage"].startswith("encode") else last

@@ -65,12 +65,13 @@ def check_reach(scene: SceneDescription, centre_m: NDArray[np.float64], *, small
                 bounds[id(part.geometry)] = _corners(part)
             corners = bounds[id(part.geometry)]
             reach_m = max(reach_m, _reach_m(corners, item.to_world @ part.to_object, centre_m))
-    if reach_m < smallest_m:
-        raise FieldError(
-            f"the scene lies within {reach_m:.2g} m of the camera; must reach >= {smallest_m:g} m. Scale the scene, "
-            "the camera's pupil and the distances of lights up together: radiance does not change.",
-            path="scene.objects",
-        )
+            if reach_m >= smallest_m:
+                return
+    raise FieldError(
+        f"the scene lies within {reach_m:.2g} m of the camera; must reach >= {smallest_m:g} m. Scale the scene, "
+        "the camera's pupil and the distances of lights up together: radiance does not change.",
+        path="scene.objects",
+    )
 
 
 def _corners(part: Part) -> NDArray[np.float64]:

@@ -40,6 +40,7 @@ from fullwell.scene.description import (
     Rectangle,
     RoughPlastic,
     SceneDescription,
+    SceneObject,
     Sphere,
     SpotLight,
     SunSky,
@@ -91,12 +92,15 @@ def check_scene(scene: SceneDescription) -> None:
     message. Each mesh and each material is looked at once, however many objects share it.
     """
     seen: set[int] = set()
+    placed_well = _are_placed_well(scene.objects)
     for index, item in enumerate(scene.objects):
         where = _Place(f"scene.objects[{index}]", f"object {item.id!r}")
         if not item.parts:
             where.fail("parts", "is empty; an object needs at least one part. Leave the object out instead.")
-        to_world = _affine(item.to_world, where, "to_world")
+        to_world = None if placed_well else _affine(item.to_world, where, "to_world")
         for number, part in enumerate(item.parts):
+            if placed_well and _is_known(part, seen):
+                continue
             named = f" ({part.name!r})" if part.name else ""
             _part(part, to_world, _Place(f"{where.path}.parts[{number}]", f"{where.name}, part {number}{named}"), seen)
     for index, light in enumerate(scene.lights):
@@ -180,7 +184,59 @@ def _affine(matrix: ArrayLike, where: _Place, field: str) -> NDArray[np.float64]
     return given
 
 
-def _part(part: Part, to_world: NDArray[np.float64], where: _Place, seen: set[int]) -> None:
+def _are_placed_well(objects: tuple[SceneObject, ...]) -> bool:
+    """Return whether all transforms are certain to pass the checks of single parts, worked out for all at once.
+
+    False says nothing: then each part is looked at, which names the first that is wrong.
+    """
+    halves: dict[int, NDArray[np.float64]] = {}
+    parts = [(item, part) for item in objects for part in item.parts]
+    try:
+        to_world = np.array([item.to_world for item, _ in parts], dtype=np.float64)
+        to_object = np.array([part.to_object for _, part in parts], dtype=np.float64)
+        for _, part in parts:
+            if id(part.geometry) not in halves:
+                halves[id(part.geometry)] = _half_extent(part.geometry)
+        half = np.array([halves[id(part.geometry)] for _, part in parts], dtype=np.float64)
+    except (TypeError, ValueError, IndexError):  # arrays of odd shapes or types
+        return False
+    if any(given.shape[1:] != (4, 4) or not np.isfinite(given).all() for given in (to_world, to_object)):
+        return False
+    with np.errstate(all="ignore"):  # what is too large becomes infinite, and is left to the other checks
+        placed = to_world @ to_object
+        if half.shape[1:] != (3,) or not np.isfinite(placed).all():
+            return False
+        stretches = np.linalg.svd(placed[:, :3, :3], compute_uv=False)
+        reach = np.einsum("nij,nj->ni", np.abs(placed[:, :3, :3]), half) + np.abs(placed[:, :3, 3])
+    return bool(
+        all(np.all(np.abs(given[:, :3, 3]) <= _FARTHEST_M) for given in (to_world, to_object))
+        and all(np.all(np.abs(given[:, 3] - [0, 0, 0, 1]) <= _RIGID_TOLERANCE) for given in (to_world, to_object))
+        and np.all(stretches[:, -1] >= np.maximum(_SMALLEST_STRETCH, _MOST_UNEQUAL_STRETCH * stretches[:, 0]))
+        and np.all(reach <= _FARTHEST_M)
+    )
+
+
+def _is_known(part: Part, seen: set[int]) -> bool:
+    """Return whether shape and material were looked at before and the part is no lamp."""
+    return part.emission is None and id(part.geometry) in seen and id(part.material) in seen
+
+
+def _part(part: Part, to_world: NDArray[np.float64] | None, where: _Place, seen: set[int]) -> None:
+    """Check a part; without `to_world` its place was found well."""
+    if to_world is not None:
+        _placed_part(part, to_world, where)
+    if id(part.geometry) not in seen:
+        _geometry(part.geometry, where)
+        seen.add(id(part.geometry))
+    if to_world is not None:
+        _within_reach(part, to_world, where)
+    if id(part.material) not in seen:
+        _material(part.material, where)
+        seen.add(id(part.material))
+    _emission(part, where)
+
+
+def _placed_part(part: Part, to_world: NDArray[np.float64], where: _Place) -> None:
     placed = to_world @ _affine(part.to_object, where, "to_object")
     stretches = np.linalg.svd(placed[:3, :3], compute_uv=False)
     if stretches[-1] < _SMALLEST_STRETCH or stretches[-1] < _MOST_UNEQUAL_STRETCH * stretches[0]:
@@ -189,15 +245,16 @@ def _part(part: Part, to_world: NDArray[np.float64], where: _Place, seen: set[in
             f"and the object's to_world are together singular or nearly so: they stretch by {stretches[0]:.3g} one way and "
             f"{stretches[-1]:.3g} another; the ratio must be >= {_MOST_UNEQUAL_STRETCH:g}. Make the shape itself thin instead.",
         )
-    if id(part.geometry) not in seen:
-        _geometry(part.geometry, where)
-        seen.add(id(part.geometry))
+
+
+def _within_reach(part: Part, to_world: NDArray[np.float64], where: _Place) -> None:
+    placed = to_world @ part.to_object
     reach = np.abs(placed[:3, :3]) @ _half_extent(part.geometry) + np.abs(placed[:3, 3])
     if reach.max() > _FARTHEST_M:
         where.fail("geometry", f"reaches {reach.max():.3g} m from the origin; must be <= {_FARTHEST_M:g} m. Check the unit.")
-    if id(part.material) not in seen:
-        _material(part.material, where)
-        seen.add(id(part.material))
+
+
+def _emission(part: Part, where: _Place) -> None:
     if part.emission is not None:
         _power(part.emission.radiance, where, "emission.radiance")
         if part.emission.pattern is not None:

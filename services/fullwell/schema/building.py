@@ -307,13 +307,16 @@ def _motion(document: MotionDocument, pivot_m: NDArray[np.float64]) -> Motion:
 
 
 def _viewpoints(cameras: tuple[CameraRig, ...]) -> tuple[Viewpoint, ...]:
-    """Return where cameras are and how finely they see: what levels of detail are chosen by."""
+    """Return where cameras are, how finely they see and which way: what levels of detail are chosen by."""
     from fullwell.schema.conversion.traffic import Viewpoint  # noqa: PLC0415
 
-    return tuple(
-        Viewpoint(tuple(rig.camera.camera_to_world[:3, 3].tolist()), rig.camera.film.pitch_m / rig.camera.lens.focal_length_m)
-        for rig in cameras
-    )
+    found = []
+    for camera in (rig.camera for rig in cameras):
+        pose, film = camera.camera_to_world, camera.film
+        half_angle_rad = math.atan(camera.tangent_pitch * math.hypot(film.rows, film.cols) / 2)
+        origin_m, forward = tuple(pose[:3, 3].tolist()), tuple(pose[:3, 2].tolist())
+        found.append(Viewpoint(origin_m, film.pitch_m / camera.lens.focal_length_m, forward, half_angle_rad))
+    return tuple(found)
 
 
 def _asset_geometries(scene: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:

@@ -140,7 +140,7 @@ def _axes(to_world: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _curved(part: Part, to_world: NDArray[np.float64], number: int) -> CurvedShape | None:
     """Return a sphere, disk or cylinder as it is; None where triangles must do (planes, odd scales)."""
-    if not is_similarity(to_world):
+    if not isinstance(part.geometry, Sphere | Disk | Cylinder) or not is_similarity(to_world):
         return None
     match part.geometry:
         case Sphere(radius_m=radius):

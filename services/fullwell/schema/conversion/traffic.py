@@ -48,15 +48,33 @@ _LEVEL_ERROR_PX: Final = 0.7
 _CROWD_ERROR_PX: Final = 1.4
 """For plants: an edge that is off is seen, but nobody tells one leaf of a few pixels from its neighbours."""
 
+_UNSEEN_FACTOR: Final = 4.0
+"""By how much an error may be larger where no camera looks: of such things shadows, reflections and scattered light are seen.
+The sun alone blurs a shadow's edge by six pixels of a camera with 640 of them across 60 degrees."""
+
+_MARGIN_RAD: Final = math.radians(5.0)
+"""Things within this angle of the picture's corners count as seen: they, or the camera, may turn during the exposure."""
+
 _streets: OrderedDict[str, Street] = OrderedDict()
 
 
 @dataclass(frozen=True, slots=True)
 class Viewpoint:
-    """Where a camera is (3,) [m], and the angle [rad] that its finest pixel sees."""
+    """Where a camera is (3,) [m], the angle [rad] that its finest pixel sees, its direction, and the angle to its corners."""
 
     origin_m: tuple[float, float, float]
     pixel_rad: float
+    forward: tuple[float, float, float]
+    half_angle_rad: float
+
+    def may_see(self, centre_m: Array, radius_m: float) -> bool:
+        """Return whether a ball may be in the picture."""
+        towards = centre_m - np.array(self.origin_m)
+        distance_m = float(np.linalg.norm(towards))
+        if distance_m <= radius_m:
+            return True
+        angle_rad = math.acos(min(1.0, max(-1.0, float(towards @ np.array(self.forward)) / distance_m)))
+        return angle_rad - math.asin(radius_m / distance_m) <= self.half_angle_rad + _MARGIN_RAD
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -412,10 +430,14 @@ def _matches(name: str, patterns: Sequence[str]) -> bool:
 
 def _level(item: PlacedAsset, distances_m: Sequence[float], viewpoints: Sequence[Viewpoint]) -> int:
     """Return the coarsest level whose error is too small to be seen from any camera."""
-    seen = zip(distances_m, viewpoints, strict=True)
     is_crowd = ASSET_CLASSES[item.asset.asset_class].group == "vegetation"
     most_px = _CROWD_ERROR_PX if is_crowd else _LEVEL_ERROR_PX
-    allowed_m = min(most_px * view.pixel_rad * distance for distance, view in seen)
+    centre_m = item.position_m + np.array([0.0, 0.0, item.asset.size_m[2] / 2])
+    radius_m = float(np.linalg.norm(item.asset.size_m)) / 2
+    allowed_m = math.inf
+    for distance_m, view in zip(distances_m, viewpoints, strict=True):
+        factor = 1.0 if view.may_see(centre_m, radius_m) else _UNSEEN_FACTOR
+        allowed_m = min(allowed_m, factor * most_px * view.pixel_rad * distance_m)
     fitting = [number for number, level in enumerate(item.asset.levels) if level.error_m <= allowed_m]
     return max(fitting, default=0)
 
