@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import gc
 import json
+import math
 import statistics
 import tempfile
 from collections.abc import Iterator
@@ -125,17 +126,24 @@ def _key(kind: str, scene: str, settings: Settings) -> Record:
     return {"kind": kind, "scene": scene, "size": list(settings.size), "path": path_version()}
 
 
+_APART = 2.0
+"""Times the errors of both together: two references that differ by more are of different models."""
+
+
 def _judges(frame: FrameDescription, own: Reference, mitsuba: Reference | None) -> dict[bool, NoiseJudge]:
     """Return the judge of this project's engines (False) and that of Mitsuba (True).
 
     Mitsuba's bands are judged by channels made of bands: averaging responses over bands is no noise. Its own reference is
-    taken where it has at least as small an error, so that what tells the two renderers apart is no noise either.
+    taken where it has at least as small an error, and where the two references differ by more than both errors explain: what
+    tells the two renderers apart is no noise either.
     """
     judges = {False: NoiseJudge(frame, truth_of(frame, own, direct=True))}
     judges[True] = NoiseJudge(frame, truth_of(frame, own, direct=False))
     if mitsuba is not None:
         other = NoiseJudge(frame, truth_of(frame, mitsuba, direct=False))
-        if _own_error(other) <= _own_error(judges[True]):
+        mine, its = _own_error(judges[True]), _own_error(other)
+        apart = judges[True].judge(other.truth.channels).raw_rms
+        if its <= mine or apart > _APART * math.hypot(mine, its):
             judges[True] = other
     return judges
 
