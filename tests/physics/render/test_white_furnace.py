@@ -57,7 +57,13 @@ MATERIALS: list[tuple[str, Material, int]] = [
 ]
 """With camera rays per film sample that bring the standard error below `LARGEST_ERROR`."""
 
-SLOW = ("glass of roughness 0.02", "glass of roughness 0.3", "glass of roughness 1.0", "dispersive glass of roughness 0.02")
+SLOW = (
+    "glass of roughness 0.02",
+    "glass of roughness 0.3",
+    "glass of roughness 1.0",
+    "dispersive glass of roughness 0.02",
+    *(f"principled of roughness {r}, metallic {m}" for r, m in ((0.1, 0.5), (0.5, 0.0), (0.5, 1.0), (1.0, 0.5))),
+)
 
 
 def relative_to_light(objects: tuple[SceneObject, ...], samples: int, depth: int) -> tuple[float, float]:
