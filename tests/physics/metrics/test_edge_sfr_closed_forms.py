@@ -68,6 +68,7 @@ def test_mtf50_is_found_between_the_steps_and_above_the_sampling_limit(normal_de
     assert response.mtf50_cycles_per_px == pytest.approx(analytic, abs=2 * one_tenth_percent)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("normal_deg", [3.0, 8.0, 20.0])
 def test_a_box_pixel_has_the_sinc_of_its_aperture(normal_deg: float) -> None:
     frequency = np.linspace(0, 6, 6001)

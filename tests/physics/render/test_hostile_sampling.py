@@ -167,6 +167,7 @@ def two_groups() -> SceneDescription:
     return SceneDescription((ground(),), lamps)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("importance", [(("warm", 0.0),), (("warm", 0.0), ("cold", 0.0))], ids=["one", "all"])
 def test_group_of_weight_zero_keeps_its_light_and_can_be_left_out(importance: tuple[tuple[str, float], ...]) -> None:
     light = even(two_groups(), 4096, keep_groups=True, group_importance=importance)

@@ -50,6 +50,7 @@ def rendered(threshold: str) -> dict[str, object]:
     return found
 
 
+@pytest.mark.slow
 def test_instances_give_the_picture_and_the_labels_of_copies() -> None:
     instances, copies = rendered("0"), rendered("inf")
     assert instances["variant"] == "scalar_spectral"

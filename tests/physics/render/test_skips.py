@@ -111,6 +111,7 @@ def direct(plan: LightPlan, frame: FrameDescription) -> LightPlan:
     return replace(plan, scene=frame.scene, request=replace(plan.request, max_depth=frame.quality.max_depth))
 
 
+@pytest.mark.slow
 def test_a_street_looks_the_same_without_what_is_far_behind() -> None:
     frame = frame_of(street(), [SKY, SUN])
     plan, whole = both(frame)

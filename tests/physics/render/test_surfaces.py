@@ -95,6 +95,7 @@ print((hits.object_index + 1).sum(), hits.amodal_px.tolist(), round(float(hits.r
 """
 
 
+@pytest.mark.slow
 def test_scalar_and_compiled_queries_agree() -> None:
     def run(**variables: str) -> str:
         command = [sys.executable, "-c", QUERY, str(Path(__file__).parent)]

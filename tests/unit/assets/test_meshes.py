@@ -240,6 +240,7 @@ class TestRefusals:
         (tmp_path / "a.fbx").write_bytes(b"x")
         assert ".glb" in refusal(tmp_path / "a.fbx")
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("suffix", [".glb", ".gltf", ".obj", ".ply", ".stl", ".usd", ".usda", ".usdc", ".usdz"])
     @pytest.mark.parametrize("content", [b"", b"\x00", b"garbage\n" * 50, bytes(range(256)) * 40])
     def test_garbage_is_refused_in_every_format(self, tmp_path: Path, suffix: str, content: bytes) -> None:

@@ -77,6 +77,7 @@ print(json.dumps({p["name"]: p["sha256"] for p in manifest["products"]}))
 """
 
 
+@pytest.mark.slow
 def test_same_recipe_gives_the_same_bytes_in_another_process_with_another_number_of_threads(
     recipe: dict[str, Any], tmp_path: Path
 ) -> None:

@@ -318,6 +318,7 @@ class FaultyStore:
 TROUBLE = [StorageError("the disk is full"), ConflictError("a file is in the way"), OSError("gone"), RuntimeError("a bug")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error", TROUBLE, ids=lambda error: type(error).__name__)
 @pytest.mark.parametrize(
     "failing", [("get",), ("put",), ("list",), ("delete",), ("get", "put", "list", "delete")], ids="+".join
@@ -462,6 +463,7 @@ print(json.dumps([manifest["run"]["cache"][0]["result"], manifest["products"]]))
 """
 
 
+@pytest.mark.slow
 def test_processes_that_need_the_same_light_render_it_once(recipe: dict[str, Any], tmp_path: Path) -> None:
     commands = [[sys.executable, "-c", PRODUCE, str(tmp_path), f"f/{number}"] for number in range(3)]
     running = [subprocess.Popen(command, stdin=-1, stdout=-1, text=True) for command in commands]

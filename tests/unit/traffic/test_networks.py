@@ -32,6 +32,7 @@ XODR = """<?xml version="1.0"?><OpenDRIVE><header revMajor="1" revMinor="4" name
 <width sOffset="0" a="2" b="0" c="0" d="0"/></lane></right></laneSection></lanes></road></OpenDRIVE>"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", [*GENERATED_NAMES, *TEMPLATE_NAMES])
 def test_every_layout_makes_a_network_and_the_same_bytes_again(layout: str) -> None:
     spec = NetworkSpec(layout, length_m=150.0, size=(20, 0) if layout == "random" else (3, 3))

@@ -210,6 +210,7 @@ def test_a_city_where_roads_meet_does_not_stand_still() -> None:
     assert speeds[0] > speeds[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "layout"), [("city", "cross"), ("suburb", "grid"), ("rural", "curve"), ("motorway", "motorway")]
 )

@@ -119,6 +119,7 @@ def test_a_damaged_run_or_a_time_that_it_lacks_is_refused(
         read_fcd(tmp_path / "fcd.xml", network, times_s=[9.0], types={})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("demand", "says"),
     [

@@ -138,6 +138,7 @@ def test_radiance_of_sample_and_of_escaped_rays_agree(mi) -> None:
     assert density(lit, directions) == pytest.approx(sample.pdf.numpy(), rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [(1, 1), (2, 3), (24, 50), (300, 600)])
 def test_density_integrates_to_one_and_estimates_to_the_integral(mi, shape) -> None:
     lit = Lit.of(mi, lamps(), [ImageEnvironment(hilly(*shape), ONE)])

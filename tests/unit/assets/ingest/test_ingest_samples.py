@@ -39,6 +39,7 @@ def sound(prepared: PreparedAsset) -> None:
         assert np.abs(low + high)[:2].max() <= 2 * slack_m
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("folder", "count"), [("kenney_city", 15), ("kenney_vehicles", 3), ("usd_mini_car_kit", 5)])
 def test_every_sample_is_taken_in(samples: Path, folder: str, count: int) -> None:
     found = [sample for sample in shared_samples(samples) if sample.folder.name == folder]
@@ -57,6 +58,7 @@ def test_every_model_of_the_sumo_package_is_taken_in() -> None:
         sound(prepare_file(sample.folder, sample.main, options, isolated=True))
 
 
+@pytest.mark.slow
 def test_the_samples_in_other_formats_are_taken_in(samples: Path, tmp_path: Path) -> None:
     sizes = {}
     for folder, mains in make_samples(samples, tmp_path):

@@ -83,6 +83,7 @@ def test_a_leaf_has_the_length_and_about_the_area_of_its_kite() -> None:
     assert area_m2(leaf) == pytest.approx(0.5 * 0.10 * 0.06, rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("entry_id", LEAFY)
 def test_leaves_fill_the_crown_with_a_plausible_area(entry_id: str) -> None:
     tree = built(entry_id)

@@ -45,6 +45,7 @@ def _masking(z: np.ndarray | float, alpha: float) -> np.ndarray:
     return 2 / (1 + np.sqrt(1 + alpha**2 * (1 - square) / square))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("alpha", [0.07, 0.33, 0.9])
 def test_tables_agree_with_monte_carlo_over_all_normals(alpha: float) -> None:
     monte_carlo_error = 6e-3
