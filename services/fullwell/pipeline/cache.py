@@ -9,8 +9,6 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
-import structlog
-
 from fullwell.core.hashing import digest_of
 from fullwell.pipeline.keys import light_key
 from fullwell.pipeline.maker import maker
@@ -39,8 +37,6 @@ _MAKERS = ("core", "radiometry", "scene", "render")
 """The packages whose code decides rendered light, beside those whose versions are named."""
 
 Shapes = tuple[tuple[int, ...], tuple[int, ...] | None]
-
-log = structlog.get_logger("fullwell.cache")
 
 
 class LightCache:
@@ -175,18 +171,13 @@ def with_cache_steps(plan: FramePlan, frame: FrameDescription, stages: StageStor
 
 
 def _read(stages: StageStore, stored_key: str, shapes: Shapes) -> RenderedLight | None:
-    content = stages.get(KIND, stored_key)
-    if content is None:
-        return None
-    try:
+    def decode(content: memoryview) -> RenderedLight:
         light = decode_light(content)
         if _shapes(light) != shapes:
             raise ValueError(f"its shapes are {_shapes(light)}, not {shapes}")
-    except Exception as error:  # intact as an object, yet of no use: whatever it is, it must not fail the frame
-        log.warning("unusable cache entry", key=stored_key, cause=str(error))
-        stages.discard(KIND, stored_key)
-        return None
-    return light
+        return light
+
+    return stages.read(KIND, stored_key, decode)
 
 
 def stored_light_key(key: str) -> str:

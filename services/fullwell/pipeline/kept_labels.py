@@ -10,7 +10,6 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Final, Literal
 
 import numpy as np
-import structlog
 
 from fullwell.core.hashing import digest_of
 from fullwell.labels import Box3D, Labels, ObjectLabel
@@ -28,8 +27,6 @@ _MAKERS: Final = ("core", "scene", "render", "labels")
 _MOST_KEPT: Final = 4
 _WORTH_KEEPING_S: Final = 0.5
 """Labels that took less are not put into the object store: reading them would take as long as making them."""
-
-log = structlog.get_logger("fullwell.cache")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,18 +81,13 @@ def _key(scene: SceneDescription, look: str) -> str:
 
 
 def _read(stages: StageStore, key: str, objects: int) -> Labels | None:
-    content = stages.get(KIND, key)
-    if content is None:
-        return None
-    try:
+    def decode(content: memoryview) -> Labels:
         labels = decode_labels(content)
         if len(labels.instance_table) != objects:
             raise ValueError(f"it lists {len(labels.instance_table)} objects, not {objects}")
-    except Exception as error:  # intact as an object, yet of no use: whatever it is, it must not fail the frame
-        log.warning("unusable cache entry", key=key, cause=str(error))
-        stages.discard(KIND, key)
-        return None
-    return labels
+        return labels
+
+    return stages.read(KIND, key, decode)
 
 
 def encode_labels(labels: Labels) -> tuple[bytes | memoryview, ...]:

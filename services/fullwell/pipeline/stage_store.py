@@ -21,6 +21,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from typing import TypeVar
 
 import structlog
 
@@ -54,6 +55,7 @@ _OBJECT = re.compile(
 )
 
 Tick = Callable[[], None]
+T = TypeVar("T")
 
 log = structlog.get_logger("fullwell.cache")
 
@@ -125,6 +127,18 @@ class StageStore:
             log.warning("damaged cache entry", object=address, action="deleted; the stage runs again")
             self.store.delete(address)
         return None
+
+    def read(self, kind: str, key: str, decode: Callable[[memoryview], T]) -> T | None:
+        """Return what `decode` makes of an entry, or None. One that it refuses is deleted, whatever error it raises."""
+        content = self.get(kind, key)
+        if content is None:
+            return None
+        try:
+            return decode(content)
+        except Exception as error:  # intact as an object, yet of no use: it must not fail the frame
+            log.warning("unusable cache entry", key=key, cause=str(error))
+            self.discard(kind, key)
+            return None
 
     def has(self, kind: str, key: str) -> bool:
         """Return whether an entry is there; it is not read."""

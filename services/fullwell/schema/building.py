@@ -159,11 +159,12 @@ class RecipeBuilder:
 
             context.moments_s = _moments(self._document)
             context.street = street_view(recipe.scene.traffic, context)
+        street_files = dict(context.used_files)
         cameras = tuple(
             camera_rig(camera, f"cameras[{i}]", recipe.quality.oversampling, context) for i, camera in enumerate(recipe.cameras)
         )
         plain = recipe.plain()
-        placed, of_scene = self._placed(recipe, plain, grid, context.street, cameras)
+        placed, of_scene = self._placed(recipe, plain, grid, cameras, street=context.street, street_files=street_files)
         _check_light_groups(recipe, placed)
         if self._views is None:
             self._views = self._shared_views(context)
@@ -200,10 +201,15 @@ class RecipeBuilder:
         recipe: RecipeDocument,
         plain: dict[str, Any],
         grid: WavelengthGrid,
-        street: StreetView | None,
         cameras: tuple[CameraRig, ...],
+        *,
+        street: StreetView | None,
+        street_files: dict[str, str],
     ) -> tuple[PlacedScene, Context]:
-        """Return the scene, the very object of the frame before where it is the same: what was loaded of it is used again."""
+        """Return the scene, the very object of the frame before where it is the same: what was loaded of it is used again.
+
+        `street_files` are {name: SHA-256} of what the street was made of.
+        """
         from fullwell.schema.assets import is_pinned  # noqa: PLC0415
         from fullwell.schema.conversion.context import Context  # noqa: PLC0415
         from fullwell.schema.conversion.scenes import scene_of  # noqa: PLC0415
@@ -216,6 +222,7 @@ class RecipeBuilder:
         viewpoints = _viewpoints(cameras) if street is not None else ()
         if street is not None:
             contents |= {"seed": recipe.seed, "assets": plain.get("assets"), "views": [repr(view) for view in viewpoints]}
+            contents |= {"street_files": street_files}
         # Draws from whatever the store has at the moment are not another recipe's to use.
         kept = self._kept if not self._kept_elsewhere or is_pinned(recipe) else KeptScene()
         key = canonical_json(contents)

@@ -7,12 +7,14 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import trimesh
 
-from assets_in_memory import MemoryAssets, small_car
+from assets_in_memory import MemoryAssets, small_car, street_boxes
 from fullwell.schema import KeptScene, RecipeBuilder, RecipeError, load_recipe
 from fullwell.schema.assets import pin_assets
+from fullwell.traffic.networks import NetworkSpec, make_network
 
 
 @pytest.fixture
@@ -95,3 +97,39 @@ def test_only_pinned_draws_are_shared(recipe: dict[str, Any], tmp_path: Path) ->
     pinned = pin_assets(load_recipe(recipe), few)
     third, fourth = (RecipeBuilder(pinned, assets=few, kept=kept).frame(0) for _ in range(2))
     assert third.scene is fourth.scene
+
+
+def test_roads_of_another_folder_are_another_scene(tmp_path: Path) -> None:
+    store = MemoryAssets(*street_boxes(), folder=tmp_path)
+    recipe = {
+        "schema": "fullwell/recipe/v1",
+        "name": "roads",
+        "scene": {
+            "traffic": {"network": {"file": "roads.net.xml"}, "time_s": 1, "dressed": False},
+            "lights": [{"name": "sky", "kind": "constant_environment", "luminance_cd_m2": 3000, "spd": "D65"}],
+        },
+        "cameras": [
+            {
+                "name": "mast",
+                "pose": {"origin_m": [92, 92, 6], "target_m": [100, 100, 0]},
+                "lens": {"kind": "pinhole", "hfov_deg": 60, "f_number": 4},
+                "sensors": [{"name": "s", "model": "imx363", "rows": 48, "cols": 64, "exposure": {"time_s": 0.001}}],
+            }
+        ],
+        "outputs": ["labels.json"],
+    }
+    folders = []
+    for length_m in (200.0, 300.0):
+        folders.append(tmp_path / f"{length_m:g}")
+        folders[-1].mkdir()
+        (folders[-1] / "roads.net.xml").write_bytes(make_network(NetworkSpec("cross", length_m=length_m)).xml)
+    kept, pinned = KeptScene(), pin_assets(load_recipe(recipe), store)
+
+    def scene(folder: Path) -> Any:
+        return RecipeBuilder(pinned, base_dir=folder, assets=store, kept=kept).frame(0).scene
+
+    short, again, long = scene(folders[0]), scene(folders[0]), scene(folders[1])
+    assert short is again
+    assert long is not short
+    reaches = [max(float(np.abs(part.geometry.vertices_m).max()) for part in s.objects[0].parts) for s in (short, long)]
+    assert reaches[1] > reaches[0]
